@@ -19,12 +19,12 @@ ROBOT_DESCRIPTION = "robot_description"
 PYBULLET_DATA_PATH = "pybullet_data_path"
 """Value in search paths that selects the folder of PyBullet's data."""
 LONGEST_PATH = 1000
-"""Largest length of a path; PyBullet copies it into 1024 bytes."""
+"""Largest length of a path [bytes]; PyBullet copies paths into buffers of 1024 bytes."""
 KERNEL_FOLDERS = ("/proc/", "/sys/", "/dev/")
-"""Folders with special files: reading one may never end."""
+"""Folders with special files, whose reading may never end."""
 ASSETS = "example-robot-data"
-"""Python package with the robots of the extra `assets`. Paths refer to the package like to a ROS package, for example
-`{example-robot-data}/robots/...`."""
+"""Python package that the extra `assets` installs, with robot models. Paths name the package like a ROS package, for
+example `{example-robot-data}/robots/...`."""
 
 
 def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
@@ -35,7 +35,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
     Args:
         name: Path in the YAML file; `{package}/path` and `package://package/path` are resolved.
         file: The YAML file, or `~config` for a configuration from the parameter server, which has no folder.
-        search_paths: Further folders.
+        search_paths: Additional folders to search.
 
     Raises:
         ValueError: If the file does not exist, or the package is unknown.
@@ -102,7 +102,7 @@ def find_folder(name: str, file: str) -> str:
 
 @lru_cache(maxsize=1)
 def pybullet_data() -> tuple[str, ...]:
-    """Returns the folder of PyBullet's data without importing PyBullet; empty if the data are not installed."""
+    """Returns the folder of PyBullet's data, or an empty tuple if it is not installed; does not import PyBullet."""
     spec = find_spec("pybullet_data")
     return tuple(spec.submodule_search_locations or ()) if spec else ()
 
@@ -144,7 +144,8 @@ def _assets_below(entries: tuple[str, ...]) -> Path:
 
 
 ExistingFile = Annotated[Text, AfterValidator(_existing), Expects("a file name")]
-"""Absolute path of an existing file. The validation's context has the `file` and `search_paths` for `find_file`."""
+"""Absolute path of an existing file. The validation context contains the arguments `file` and `search_paths` of
+`find_file`."""
 RobotFile = Annotated[Text, AfterValidator(_existing_or_description), Expects("a file name")]
-"""Like `ExistingFile`, but also accepts the word `robot_description`. The word is replaced by the context's file for
-`robot_description`, or kept if the context has no such file."""
+"""Like `ExistingFile`, but also accepts the word `robot_description`. If the validation context contains a file for
+`robot_description`, the path of that file replaces the word."""

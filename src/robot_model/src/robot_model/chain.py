@@ -29,18 +29,18 @@ class Chain:
     Attributes:
         joints: All joints of the chain, fixed joints included, from the base to the tip.
         moving: The joints of the chain that are not fixed.
-        joint_names: Names of the n joints that solvers solve for: the moving joints, where each mimic joint is replaced
-            by the joint that it follows.
+        joint_names: Names of the n joints to solve for: the moving joints, where the followed joint replaces each mimic
+            joint.
         to_moving: The map from positions of the n joints to positions of the moving joints.
-        limits: Limits of the n joints, narrowed such that mimic joints stay within their own limits.
+        limits: Limits of the n joints, narrowed so that mimic joints stay within their own limits.
         velocity_limits: Largest speeds of the n joints [rad/s or m/s]; inf for joints without a speed limit.
         robot_joints: Names of all joints of the robot.
         mimics: Names of the chain's mimic joints.
 
     Raises:
         ConfigError: If the file cannot be read, or a joint is invalid.
-        UnknownNameError: If the robot has no link `base` or `tip`.
-        ValueError: If inverse kinematics cannot solve for the chain; the message names the joint or link.
+        UnknownNameError: If the robot does not have the link `base` or `tip`.
+        ValueError: If `base` is not an ancestor of `tip`, or if the chain has no moving joint or an unsuitable joint.
     """
 
     def __init__(self, urdf_filename: str, base: str, tip: str) -> None:
@@ -61,7 +61,7 @@ class Chain:
 
     @cached_property
     def reach(self) -> Reach:
-        """Ball around the first moving joint that contains all positions of the tip, in the base frame."""
+        """Ball around the first moving joint that contains all reachable tip positions, in the base frame."""
         first = self.joints.index(self.moving[0])
         x, y, z = reduce(np.matmul, map(origin_of, self.joints[: first + 1]))[:3, 3].tolist()
         return Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in self.joints[first + 1 :]], self.moving)
@@ -90,7 +90,7 @@ def _between(document: UrdfDocument, base: str, tip: str) -> tuple[UrdfJoint, ..
 
 
 def _leader(document: UrdfDocument, joint: UrdfJoint) -> str:
-    """Returns the name of the joint that a mimic joint follows; for other joints, their own name."""
+    """Returns the name of the joint that a mimic joint follows; for any other joint, the joint's own name."""
     if joint.mimic is None:
         return joint.name
     leader = followed(joint.name, document.mimics).joint

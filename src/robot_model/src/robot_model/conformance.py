@@ -1,4 +1,4 @@
-"""Pytest tests that every kinematics library must pass; derive from `BackendConformance` to test a library."""
+"""Pytest tests that every kinematics library must pass; derive a class from `BackendConformance` to test a library."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ class Backend(ABC):
 
     @abstractmethod
     def pose(self, q: Sequence[float], link: str) -> Pose:
-        """Returns the pose of a link in the root link, for n joint positions [rad or m]."""
+        """Returns the pose of a link in the root frame, at n joint positions [rad or m]."""
 
     @abstractmethod
     def jacobian(self, q: Sequence[float], link: str) -> Array:
-        """Returns the Jacobian of a link's origin in the axes of the root, 6 x n: linear rows, then angular rows."""
+        """Returns the Jacobian of a link's origin in the root's axes, 6 x n: linear rows, then angular rows."""
 
 
 class BackendConformance(ABC):
@@ -78,8 +78,10 @@ class BackendConformance(ABC):
 
     @pytest.fixture
     def pairs(self, tmp_path: Path) -> list[tuple[RobotModel, Backend, list[int]]]:
-        """Returns for each robot the `RobotModel`, the library's robot, and the model's index of each joint of the
-        library."""
+        """Returns a tuple for each robot: the `RobotModel`, the library's robot, and indices of joints.
+
+        The indices in the model's `joint_names` are in the order of the library's joints.
+        """
         paths = list(self.robots)
         for name, text in (("skew", SKEW), *((("mimic", MIMIC),) if self.follows_mimics else ())):
             path = tmp_path / f"{name}.urdf"
@@ -92,14 +94,14 @@ class BackendConformance(ABC):
         ]
 
     def configurations(self, robot: RobotModel) -> list[list[float]]:
-        """Returns random configurations within the joint limits, in the order of `RobotModel.joint_names`."""
+        """Returns random configurations within the limits; joints are in the order of `RobotModel.joint_names`."""
         generator = np.random.default_rng(1)
         return [robot.limits.random(generator, robot.limits.middle) for _ in range(CONFIGURATIONS)]
 
     def test_joints_and_their_limits_are_those_of_the_urdf(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """The library leaves out mimic joints, and continuous joints have infinite limits."""
+        """Joints and limits are those of `RobotModel`, without mimic joints and limits of continuous joints."""
         for robot, backend, order in pairs:
             assert sorted(backend.joint_names) == sorted(robot.joint_names)
             expected = robot.limits.of(order)
@@ -120,7 +122,7 @@ class BackendConformance(ABC):
     def test_jacobians_are_the_finite_differences_of_poses(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """The column of a joint includes the motion of the mimic joints that follow the joint."""
+        """Each Jacobian column is the finite difference of poses, which includes the motion of mimic joints."""
         for robot, backend, order in pairs:
             q = np.array(self.configurations(robot)[0])[order]
             for link in _moved_links(robot):

@@ -15,8 +15,8 @@ from .joint_map import AffineMap, Array
 from .urdf.elements import UrdfJoint
 
 MAX_MATRIX_PRODUCTS = 24
-"""Largest number of configurations that are computed with 4 x 4 matrix products (`_of_few`). For more configurations,
-arrays with one row for each matrix entry are faster (`_of_many`)."""
+"""Largest number of configurations that are computed with products of 4 x 4 matrices (`_of_few`). For more
+configurations, arrays with one row for each matrix entry are faster (`_of_many`)."""
 _ROOT = np.eye(4)
 _QUARTER = np.pi / 2.0
 _YZX, _ZXY = np.array((1, 2, 0)), np.array((2, 0, 1))
@@ -26,12 +26,13 @@ class LinkFrames:
     """Computes the frames of all links of a kinematic tree, whose joints have at most one axis.
 
     Links that are fixed to each other share one frame. Frame 0 is the root link's frame. Each other frame moves with a
-    joint: the frame's origin is the joint's origin, and its z axis is the joint's axis. The k configurations `q` are
-    positions of n driven joints, k x n [rad or m]. Thread-safe.
+    joint: the frame's origin is the joint's origin, and the frame's z axis is the joint's axis. The k configurations
+    `q` are positions of n driven joints, k x n [rad or m]. Thread-safe.
 
     Args:
         joints: All joints of the tree.
-        to_moving: Function that takes the names of moving joints, and returns the map from the n driven joints to them.
+        to_moving: Function that takes names of moving joints, and returns the map from the n driven joints' positions
+            to the moving joints' positions.
 
     Attributes:
         links: Names of all links, the root first.
@@ -68,7 +69,7 @@ class LinkFrames:
         self._last = b"", np.empty((0, len(places), 4, 4))
 
     def place(self, link: str) -> tuple[int, Array]:
-        """Returns the number of the frame that a link moves with, and the link's pose in that frame, 4 x 4."""
+        """Returns the number of the frame that a link is fixed to, and the link's pose in this frame, 4 x 4."""
         pose = np.eye(4)
         while link in self._above and link not in self._frame:
             pose = origin_of(self._above[link]) @ pose
@@ -77,7 +78,7 @@ class LinkFrames:
         return frame, self._aligned[frame].T @ pose
 
     def at(self, q: Array) -> Array:
-        """Returns the poses of all frames in the root, k x frames x 4 x 4; callers must not change the array."""
+        """Returns the poses of all f frames in the root frame, k x f x 4 x 4; callers must not change the array."""
         key = q.tobytes()
         last, frames = self._last
         if key != last:
@@ -86,7 +87,7 @@ class LinkFrames:
         return frames
 
     def of_links(self, q: Array) -> Array:
-        """Returns the poses of all links in the root, in the order of `links`, k x links x 4 x 4."""
+        """Returns the poses of all l links in the root frame, in the order of `links`, k x l x 4 x 4."""
         if len(q) <= MAX_MATRIX_PRODUCTS:
             poses: Array = self.at(q).take(self._frame_of_link, axis=1) @ self._pose_of_link
             return poses
@@ -98,16 +99,16 @@ class LinkFrames:
         return links.transpose(3, 0, 2, 1)
 
     def positions(self, q: Array, link: str) -> Array:
-        """Returns the positions of a link's origin in the root, k x 3 [m]."""
+        """Returns the positions of a link's origin in the root frame, k x 3 [m]."""
         frame, pose = self.place(link)
         positions: Array = self.at(q)[:, frame, :3] @ pose[:, 3]
         return positions
 
     def jacobian(self, q: Array, link: str, point: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-        """Returns the Jacobians of a point that is attached to a link, k x 6 x n, in the axes of the root.
+        """Returns the Jacobians of a point that is attached to a link, k x 6 x n, in the root's axes.
 
-        The first three rows map the n joint velocities to the point's velocity [m/s]. The last three rows map them to
-        the link's angular velocity [rad/s].
+        The first three rows map the n joint velocities to the point's velocity [m/s]. The last three rows map the joint
+        velocities to the link's angular velocity [rad/s].
 
         Args:
             q: The configurations, k x n [rad or m].
@@ -118,7 +119,7 @@ class LinkFrames:
         return self._jacobian(q, frame, self.at(q)[:, frame, :3] @ (pose @ (*point, 1.0)))
 
     def jacobian_at(self, q: Array, link: str, point: Sequence[float]) -> Array:
-        """Does the same as `jacobian`, but takes the position of the point in the root [m], for all configurations."""
+        """Like `jacobian`, but takes one position of the point in the root frame [m], for all configurations."""
         return self._jacobian(q, self.place(link)[0], np.broadcast_to(point, (len(q), 3)))
 
     def _jacobian(self, q: Array, frame: int, tip: Array) -> Array:
@@ -138,11 +139,11 @@ class LinkFrames:
     def _of_parts(self) -> tuple[Array, Array]:
         """Returns the affine map from n joint positions to 3 angles for each of f frames.
 
-        The frame's pose in its parent is the sum of its three `_parts`, each times the sine of its angle. The angles
-        are pi/2 (sine 1), the joint position, and the joint position plus pi/2 (sine equals cosine).
+        A frame's pose in its parent frame is the sum of the frame's three `_parts`, each multiplied by the sine of an
+        angle. The angles are pi/2 (sine 1), the joint position, and the joint position plus pi/2 (sine equals cosine).
 
         Returns:
-            Factors, n x 3 f, and offsets, 3 f.
+            Factors, shape (n, 3 * f), and offsets, shape (3 * f,).
         """
         m, n = self._to_moving.factors.shape
         factors, offsets = np.zeros((m + 1, 3, n)), np.tile((_QUARTER, 0.0, _QUARTER), (m + 1, 1))
@@ -151,9 +152,9 @@ class LinkFrames:
         return factors.reshape(-1, n).T.copy(), offsets.ravel()
 
     def _of_few(self, q: Array) -> Array:
-        """Computes the frames in few configurations: poses in the parents, then products along the tree.
+        """Computes the frames in few configurations: first the poses in the parent frames, then products of poses.
 
-        Each product doubles the number of joints that a pose covers, so the products take log2(depth) steps.
+        Each step doubles the number of joints that a pose covers, so the products take log2(depth) steps.
         """
         angles = q.dot(self._factors)
         angles += self._offsets
@@ -166,9 +167,9 @@ class LinkFrames:
         return frames
 
     def _of_many(self, q: Array) -> Array:
-        """Computes the frames in many configurations, with one row of k numbers for each matrix entry, columns first.
+        """Computes the frames in many configurations, with one row of k numbers for each matrix entry.
 
-        Frames are computed one after the other, each from its parent's frame.
+        Frames are computed one after the other, each from its parent frame. Matrices are stored in column-major order.
         """
         positions = self._to_moving.factors @ q.T + self._to_moving.offsets[:, None]
         sines, cosines = np.sin(positions), np.cos(positions)
@@ -199,7 +200,7 @@ def origin_of(joint: UrdfJoint) -> Array:
 
 
 def _aligned_with(axis: Vector) -> Array:
-    """Returns the pose of a frame whose z axis is the unit vector `axis`, 4 x 4; its origin is 0."""
+    """Returns the pose of a frame with the origin 0, whose z axis is the unit vector `axis`, 4 x 4."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(other, axis)
     x /= np.linalg.norm(x)
@@ -228,10 +229,10 @@ def _parts(joint: UrdfJoint, fixed: Array) -> Array:
 
 
 def _rows(count: int, k: int) -> tuple[Array, Array]:
-    """Allocates `count` matrices for k configurations, columns first, with the last row set to 0, 0, 0, 1.
+    """Allocates `count` matrices for k configurations in column-major order, with the last row set to 0, 0, 0, 1.
 
     Returns:
-        The matrices, count x 4 x 4 x k, and a view of their upper three rows, count x 4 x 3 k.
+        The matrices, shape (count, 4, 4, k), and a view of their upper three rows, shape (count, 4, 3 * k).
     """
     matrices = np.empty((count, 4, 4, k))
     matrices[:, :, 3] = _ROOT[3][:, None]

@@ -1,7 +1,7 @@
 """Poses, twists, rotations and vectors as tuples of floats, which are ten times as fast as small NumPy arrays.
 
-Quaternions are in the order x, y, z, w. `custom_ros_tools.transforms` converts to and from matrices, and roll, pitch,
-yaw.
+Quaternions are in the order x, y, z, w. For conversions to and from matrices and roll, pitch, yaw, see
+`custom_ros_tools.transforms`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Pose(NamedTuple):
         return Pose(position, quaternion_product(self.quat_xyzw, other.quat_xyzw))
 
     def inverse(self) -> Pose:
-        """Returns the inverse: for the pose of b in a, the pose of a in b."""
+        """Returns the inverse pose. If this pose is that of b in a, the inverse is the pose of a in b."""
         x, y, z, w = self.quat_xyzw
         return Pose(rotated((-x, -y, -z, w), scaled(-1.0, self.position)), (-x, -y, -z, w))
 
@@ -50,7 +50,7 @@ class Twist(NamedTuple):
     angular: Vector = ZERO
 
     def seen_from(self, quat_xyzw: Quaternion) -> Twist:
-        """Expresses the twist in the axes of a frame with the orientation `quat_xyzw`."""
+        """Converts the twist to the axes of a frame with the orientation `quat_xyzw`."""
         return Twist(rotated_back(quat_xyzw, self.linear), rotated_back(quat_xyzw, self.angular))
 
 
@@ -84,7 +84,7 @@ def minus(a: Vector, b: Vector) -> Vector:
 
 
 def scaled(factor: float, a: Vector) -> Vector:
-    """Returns a vector times a number."""
+    """Multiplies a vector by a number."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
@@ -104,7 +104,7 @@ def norm(a: Vector) -> float:
 
 
 def shortened_to(a: Vector, length: float) -> Vector:
-    """Scales a vector down to the length `length` if it is longer; otherwise returns the vector unchanged."""
+    """Scales a vector down to the length `length`; returns shorter vectors unchanged."""
     now = norm(a)
     return a if now <= length else scaled(length / now, a)
 
@@ -116,7 +116,7 @@ def turned_about_z(a: Vector, yaw: float) -> Vector:
 
 
 def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Rotates a vector: converts it from the axes of a frame with this orientation to the axes of the parent frame."""
+    """Rotates a vector by a quaternion, which converts the vector from a frame's axes to the parent frame's axes."""
     x, y, z, w = quat_xyzw
     tx, ty, tz = cross((2.0 * x, 2.0 * y, 2.0 * z), a)
     cx, cy, cz = cross((x, y, z), (tx, ty, tz))
@@ -124,7 +124,7 @@ def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
 
 
 def rotated_back(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Rotates a vector back: converts it from the parent's axes to the axes of a frame with this orientation."""
+    """Rotates a vector by the inverse quaternion, which converts it from the parent frame's axes to a frame's axes."""
     x, y, z, w = quat_xyzw
     return rotated((-x, -y, -z, w), a)
 

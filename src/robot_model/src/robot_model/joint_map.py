@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class AffineMap(NamedTuple):
-    """Positions of m joints as a function of the positions q of n driven joints: `factors @ q + offsets`.
+    """Affine map from the positions q of n driven joints to the positions of m joints: `factors @ q + offsets`.
 
     Attributes:
         factors: Matrix m x n, which also maps velocities of the n joints to velocities of the m joints.
@@ -42,8 +42,9 @@ class AffineMap(NamedTuple):
         Args:
             names: Names of the m selected joints.
             driven: Names of the n driven joints.
-            mimics: Mimic relations by the name of the mimic joint; a followed joint may itself be a mimic joint.
-            still: Positions of joints that are not driven, by name [rad or m]; 0 for joints without an entry.
+            mimics: Mimic relations, indexed by mimic joint name; a followed joint may itself be a mimic joint.
+            still: Positions of joints that are not driven, indexed by joint name [rad or m]; joints without an entry
+                are at 0.
         """
         columns = {name: column for column, name in enumerate(driven)}
         factors, offsets = np.zeros((len(names), len(driven))), np.zeros(len(names))
@@ -58,7 +59,7 @@ class AffineMap(NamedTuple):
 
 
 def followed(name: str, mimics: Mapping[str, Mimic]) -> Mimic:
-    """Resolves a chain of mimic joints: returns the relation of a mimic joint to the last joint of the chain.
+    """Returns the relation of a mimic joint to the joint that it follows, also if it follows another mimic joint.
 
     Raises:
         ValueError: If the chain is a loop; the message names the joint.

@@ -31,12 +31,12 @@ class Axis(Protocol):
 
 
 class Limits:
-    """Limits of n joints, stored as plain numbers, which are faster than small arrays.
+    """Limits of n joints, stored as plain numbers, since calculations with small arrays are slower.
 
     Args:
         lower: n lower limits [rad or m]; -inf for joints without a lower limit.
         upper: n upper limits [rad or m]; inf for joints without an upper limit.
-        is_revolute: For each of the n joints, whether it is revolute or continuous.
+        is_revolute: n flags, true for revolute and continuous joints.
 
     Attributes:
         middle: n positions half-way between the limits. For a joint without both limits, the allowed position that is
@@ -53,7 +53,7 @@ class Limits:
 
     @classmethod
     def of_joints(cls, joints: Sequence[Axis]) -> Limits:
-        """Collects the limits of several joints, in their order."""
+        """Collects the limits of several joints, in the order of `joints`."""
         lower, upper = [joint.lower for joint in joints], [joint.upper for joint in joints]
         return cls(lower, upper, [joint.is_revolute for joint in joints])
 
@@ -63,7 +63,7 @@ class Limits:
         return Limits(lower, upper, [self.is_revolute[i] for i in members])
 
     def wrap_to_limits(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], list[bool]]:
-        """Moves positions into the limits: revolute joints by whole turns if possible, otherwise by clipping.
+        """Moves positions into the limits: by whole turns if this is possible for a revolute joint, or by clipping.
 
         A position that exceeds a limit by at most `LIMIT_ROUNDING` is set to the limit, and does not count as clipped.
 
@@ -73,7 +73,7 @@ class Limits:
                 limits, the angle nearest to its reference position is preferred.
 
         Returns:
-            The n positions within the limits, and for each position whether it was clipped.
+            The n positions within the limits, and n flags that tell which positions were clipped.
         """
         inside, stopped = [], []
         for position, close, (lower, upper, is_revolute) in zip(q, near, self._joints):
@@ -93,9 +93,9 @@ class Limits:
         return [min(max(position, lower), upper) for position, lower, upper in zip(q, self.lower, self.upper)]
 
     def random(self, generator: Generator, near: Sequence[float]) -> list[float]:
-        """Draws random positions within the limits, uniformly.
+        """Draws uniformly distributed random positions within the limits.
 
-        Where a limit is missing, the range ends half a turn or 1 m from the joint's position in `near`.
+        If a joint lacks a limit, its range ends half a turn or 1 m from the joint's position in `near`.
         """
         positions = []
         for close, (lower, upper, is_revolute) in zip(near, self._joints):
@@ -106,13 +106,13 @@ class Limits:
         return positions
 
     def starts(self, first: list[float], restarts: int, seed: Callable[[], Generator]) -> Iterator[list[float]]:
-        """Yields configurations at which a search starts, each with n positions [rad or m].
+        """Yields start configurations of a search, each with n positions [rad or m].
 
         Args:
             first: The first configuration.
             restarts: Number of random configurations that follow.
-            seed: Function that makes the random generator. It is called only when a second configuration is requested,
-                since making a generator is slow.
+            seed: Function that makes the random generator. This function is slow, and therefore only called when a
+                second configuration is requested.
         """
         yield first
         generator = seed()
@@ -121,7 +121,7 @@ class Limits:
 
 
 def _turned(position: float, lower: float, upper: float) -> float:
-    """Moves an angle by whole turns until it no longer exceeds the limit that it exceeded, and returns it."""
+    """Moves an angle by whole turns until the angle no longer exceeds the limit that was exceeded."""
     if position > upper:
         return position - TURN * math.ceil((position - upper - LIMIT_ROUNDING) / TURN)
     return position + TURN * math.ceil((lower - position - LIMIT_ROUNDING) / TURN)

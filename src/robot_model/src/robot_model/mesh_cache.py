@@ -15,7 +15,7 @@ from custom_ros_tools.errors import shortened
 MAX_FILE_BYTES = 1_000_000_000
 """Largest length of a file [bytes]."""
 MAX_FILES = 100
-"""Largest number of files of one mesh, including its materials and textures."""
+"""Largest number of files that belong to one mesh: the mesh file, materials and textures."""
 
 
 def cache_folder() -> Path:
@@ -24,10 +24,10 @@ def cache_folder() -> Path:
 
 
 def content_hash(file: str, *parameters: object) -> str:
-    """Returns a hash of everything that a result computed from a mesh depends on.
+    """Returns a hash of all data that a result computed from a mesh depends on.
 
-    The hash covers the mesh file and the materials and textures that it names, PyBullet's version, and `parameters`.
-    Missing files are ignored.
+    These data are the mesh file, the materials and textures that the mesh file names, PyBullet's version, and
+    `parameters`. Missing files are ignored.
 
     Raises:
         OSError: If a material or texture exists but cannot be read as an ordinary file, or if there are more than
@@ -75,7 +75,7 @@ def cached(name: str, make: Callable[[Path], None]) -> Path:
     If several processes make the same folder at the same time, the first result is kept.
 
     Args:
-        name: Name of the folder, which should contain a hash of everything that the content depends on.
+        name: Name of the folder, which should contain a hash of all data that the content depends on.
         make: Function that writes the content into an empty folder.
 
     Raises:

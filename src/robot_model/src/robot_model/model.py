@@ -33,7 +33,7 @@ def read_robot(urdf_path: str, not_xml: str = "is not XML") -> UrdfDocument:
         not_xml: Start of the error message for a file that is not well-formed XML.
 
     Raises:
-        ConfigError: If the file cannot be read or is not well-formed, if its structure or a joint is invalid, or if
+        ConfigError: If the file cannot be read or is not well-formed, if the structure or a joint is invalid, or if
             more than `MAX_JOINTS` joints are not fixed.
     """
     document = UrdfDocument(urdf_path, not_xml=not_xml)
@@ -52,7 +52,7 @@ class RobotModel:
     """Joints, limits and kinematics of a robot, whose links form a tree.
 
     A configuration has one position for each of n driven joints, in the order of `joint_names`. Mimic joints follow
-    their joints. All other joints are at 0, or at the limit nearest to 0.
+    the joints that the URDF specifies. All other joints are at 0, or at the limit nearest to 0.
 
     Args:
         urdf_path: Path of the URDF; its meshes need not exist.
@@ -101,7 +101,7 @@ class RobotModel:
 
     @cached_property
     def telescopic(self) -> tuple[str, ...]:
-        """Names of the driven joints that move a prismatic joint which is below a driven revolute joint in the tree."""
+        """Names of the driven joints that move prismatic joints below driven revolute joints in the tree."""
         return tuple(dict.fromkeys(name for link in self.links for name in self._telescopic_to(link)))
 
     @cached_property
@@ -154,9 +154,9 @@ class RobotModel:
         return joints[::-1]
 
     def reach(self, link: str, radius_m: float, other: str | None = None) -> Array:
-        """Returns, for each of the n joints, an upper bound on the motion of a link's points in another link.
+        """Returns n upper bounds on the motion of a link's points relative to another link, shape (n,) [m/rad or 1].
 
-        A bound is the largest distance that a point may move per 1 rad or 1 m of joint motion, shape (n,) [m/rad or 1].
+        A bound is the largest distance that a point may move per 1 rad or 1 m of a joint's motion.
 
         Args:
             link: Name of the link.
@@ -187,20 +187,20 @@ class RobotModel:
 
     @cached_property
     def _joint_motions(self) -> tuple[dict[str, Array], dict[str, float]]:
-        """The n factors, and the offset [rad or m], of each moving joint in `map_to`, by name; absolute values."""
+        """Absolute values of the n factors and of the offset [rad or m] in `map_to`, indexed by moving joint name."""
         moving = [joint.name for joint in self.all_joints.values() if joint.is_moving]
         factors, offsets = self.map_to(moving)
         return dict(zip(moving, np.abs(factors))), dict(zip(moving, np.abs(offsets).tolist()))
 
     def _travel(self, name: str) -> float:
-        """Returns the largest absolute position of a joint, up to `MAX_OUTSIDE` beyond its limits [rad or m]."""
+        """Returns a joint's largest absolute position [rad or m] if driven joints exceed limits by `MAX_OUTSIDE`."""
         factors, offsets = self._joint_motions
         farthest = (max(abs(joint.lower), abs(joint.upper)) + MAX_OUTSIDE for joint in self.joints)
         travels = (factor * most for factor, most in zip(factors[name].tolist(), farthest) if factor)
         return offsets[name] + sum(travels)
 
     def _telescopic_to(self, link: str) -> list[str]:
-        """Returns the names in `telescopic` for the chain from the root to one link; names may repeat."""
+        """Returns the names in `telescopic` for the chain from the root to one link; a name may occur repeatedly."""
         factors, _ = self._joint_motions
         turned, telescopic = False, []
         for joint in self.chain(link):

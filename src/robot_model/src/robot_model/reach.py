@@ -39,7 +39,7 @@ class Reach(NamedTuple):
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Returns whether a position in the base frame [m] is within the ball, so that the tip may reach it.
+        """Returns whether a position in the base frame [m] is within the ball. The tip cannot reach other positions.
 
         `POSITION_TOLERANCE_M` and `tolerance_m` are added to the radius.
         """
@@ -59,16 +59,16 @@ class Residual(NamedTuple):
 
     @property
     def size(self) -> float:
-        """The larger of the two errors, each divided by its tolerance. Up to 1, the target counts as reached."""
+        """The larger of the two errors, each divided by its tolerance. A target counts as reached up to a size of 1."""
         return max(self.position_m / POSITION_TOLERANCE_M, self.orientation_rad / ORIENTATION_TOLERANCE_RAD)
 
     def in_words(self, link: str, has_orientation: bool, target: str = "its target") -> str:
-        """Returns a sentence that says whether a link has reached a target, and its errors.
+        """Returns a sentence that says whether a link has reached a target, and states the errors.
 
         Args:
             link: Name of the link.
             has_orientation: Whether the sentence includes the orientation error.
-            target: Words for the target in the sentence.
+            target: Words that stand for the target in the sentence.
         """
         angle = f" and {self.orientation_rad:.3g} rad" if has_orientation else ""
         if self.size <= 1.0:

@@ -16,11 +16,11 @@ from .shapes import Obstacle, collision_shapes
 from .solids import ClosestPoints, Solid
 
 Geometry = Literal["hulls", "exact"]
-"""How meshes are measured: always as convex hulls, or as triangles where two hulls are near each other."""
+"""Representation of meshes: always as convex hulls, or as triangles where two hulls are near each other."""
 Pair = tuple[str, str | int]
 """Two links, or a link and the number of an obstacle."""
 SIGN_STEP = 1e-4
-"""Largest joint motion of the small step that determines the sign of a gradient [rad or m]."""
+"""Largest joint motion in the small step that determines the sign of a gradient [rad or m]."""
 MIN_GRADIENT = 1e-6
 """A gradient of a distance below this threshold counts as zero [m/rad]."""
 
@@ -53,29 +53,26 @@ class Shapes(Protocol):
         """Removes the obstacle with this number, if it exists."""
 
     def closest(self, link: str, other: str | int, most_m: float) -> list[ClosestPoints]:
-        """Measures each shape of a link against each shape of another link or of an obstacle.
+        """Finds the closest points between each shape of a link and each shape of another link or of an obstacle.
 
         Args:
             link: Name of the link.
             other: Name of the other link, or number of the obstacle.
             most_m: Largest distance [m]; pairs of shapes that are further apart are left out.
-
-        Returns:
-            The closest points of each pair of shapes.
         """
 
     def solids_of(self, link: str) -> list[Solid]:
-        """Returns balls around the shapes of a link, in the link's frame; they contain the shapes of the library."""
+        """Returns solids that contain the shapes of a link, in the link's frame."""
 
     def solids_of_obstacle(self, number: int) -> list[Solid]:
-        """Returns balls around the shapes of an obstacle, in the obstacle's own frame; see `solids_of`."""
+        """Returns solids that contain the shapes of an obstacle, in the obstacle's own frame."""
 
     def radius_m(self, link: str, origin: np.ndarray) -> float:
         """Returns the distance from a point to the farthest point of a link's shapes [m].
 
         Args:
-            link: Name of the link, which is measured in the present configuration.
-            origin: The point x, y, z in the robot's root link [m].
+            link: Name of the link, which is measured in the current configuration.
+            origin: The point x, y, z in the robot's root frame [m].
         """
 
 
@@ -89,8 +86,8 @@ class Contact(NamedTuple):
         direction: Unit vector along the line between the closest points. Its sign is arbitrary unless `is_exact`.
         first: The closest point on the first body [m].
         second: The closest point on the second body [m].
-        directions: Such a unit vector for each pair of shapes of the two bodies.
-        is_exact: Whether exact shapes were measured; then `direction` points from the second body to the first.
+        directions: Unit vectors along the line between the closest points, for each pair of shapes of the two bodies.
+        is_exact: Whether exact shapes were measured. If so, `direction` points from the second body to the first.
     """
 
     distance: float
@@ -102,7 +99,7 @@ class Contact(NamedTuple):
 
 
 class LinkDistances:
-    """Distances between the links of a robot, and between links and obstacles.
+    """Measures distances between the links of a robot, and between links and obstacles.
 
     Meshes are measured as convex hulls. With `geometry="exact"`, meshes are measured as triangles where their hulls are
     near each other.
@@ -114,7 +111,7 @@ class LinkDistances:
 
     Attributes:
         links: Names of the links that have a collision shape.
-        radius_m: For each link, the largest distance of its shapes from the link's origin [m].
+        radius_m: Distance from each link's origin to the farthest point of the link's shapes, indexed by link name [m].
 
     Raises:
         ConfigError: If exact shapes cannot be read.
@@ -162,7 +159,9 @@ class LinkDistances:
         return changed
 
     def solids(self, member: str | int) -> list[Solid]:
-        """Returns balls around the shapes of a link, in its frame of `LinkFrames`, or of an obstacle, in the root link.
+        """Returns solids that contain the shapes of a link or an obstacle.
+
+        The solids of a link are in the frame that `LinkFrames` gives the link. Those of an obstacle are in the root.
 
         Args:
             member: Name of the link, or number of the obstacle.
@@ -174,7 +173,7 @@ class LinkDistances:
     def pieces(self, member: str | int) -> list[Any]:
         """Returns the exact shapes of a link or an obstacle, in the same frames as `solids`.
 
-        The list is empty for planes and point sets, which are always measured as hulls. Requires exact geometry.
+        The list is empty for planes and point sets, which are always measured as hulls. Only with `geometry="exact"`.
         """
         if isinstance(member, str):
             return self._pieces[member]
@@ -188,7 +187,7 @@ class LinkDistances:
         return self._robot.frames.at(q)
 
     def distance(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> float:
-        """Returns the distance of a pair in the present configuration [m]; inf beyond `most_m`.
+        """Returns the distance between a pair in the current configuration [m]; inf if it exceeds `most_m`.
 
         See `contact` for the arguments.
         """
@@ -196,13 +195,13 @@ class LinkDistances:
         return math.inf if contact is None else contact.distance
 
     def contact(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> Contact | None:
-        """Measures a pair in the present configuration.
+        """Measures the distance between a pair in the current configuration.
 
         Args:
             pair: Two links, or a link and the number of an obstacle.
             most_m: Largest distance that is measured [m].
-            within_m: Required distance [m], for exact geometry. If the hulls are nearer than this, the exact shapes are
-                measured. If the exact shapes are at least this far apart, the returned distance is `within_m`.
+            within_m: Required distance [m], for exact geometry. If the hulls are nearer, the exact shapes are measured.
+                If the exact shapes are further apart than `within_m`, the returned distance is `within_m`.
 
         Returns:
             The contact; None if the distance exceeds `most_m`.
@@ -217,7 +216,7 @@ class LinkDistances:
         return self._exactly(pair, contact, within_m)
 
     def _exactly(self, pair: Pair, contact: Contact, within_m: float) -> Contact:
-        """Measures the exact shapes of a pair; returns the hulls' contact if exact shapes are missing or penetrate."""
+        """Measures the exact shapes of a pair. Returns the hulls' contact if exact shapes are missing or intersect."""
         assert self._exact is not None
         pieces = [self.pieces(member) for member in pair]
         if not all(pieces):
@@ -233,12 +232,12 @@ class LinkDistances:
         """Returns the derivatives of a pair's distance with respect to the n joint positions, shape (n,) [m/rad or 1].
 
         The sign of `contact.direction` is arbitrary unless exact shapes were measured. To find the sign, the modelled
-        robot moves by a small step, and back.
+        robot is moved by a small step and back.
 
         Args:
             pair: Two links, or a link and the number of an obstacle.
-            contact: The pair's contact in the present configuration.
-            q: The present configuration, n positions [rad or m].
+            contact: The pair's contact in the current configuration.
+            q: The current configuration, n positions [rad or m].
         """
         gradient = np.zeros(len(q))
         for link, point, sign in ((pair[0], contact.first, 1.0), (pair[1], contact.second, -1.0)):

@@ -1,4 +1,4 @@
-"""Distances between exact shapes, measured by hpp-fcl: meshes are triangles instead of convex hulls."""
+"""Distances between exact shapes, measured by hpp-fcl. Meshes are measured as triangles instead of convex hulls."""
 
 import math
 from collections.abc import Sequence
@@ -22,9 +22,9 @@ from .shapes import CollisionShape, Obstacle, ObstacleKind
 from .solids import ClosestPoints, Solid, extent_of
 
 TOUCHING_M = 1e-5
-"""Distance up to which shapes count as penetrating [m]. Between nearer points, the direction is undefined."""
+"""Distance up to which shapes count as intersecting [m], since the direction between so near points is undefined."""
 OUT_OF_PLACE_M = 0.015
-"""Largest difference between the boxes around a link's exact shapes and around its hulls [m]."""
+"""Largest difference between the bounding boxes of a link's exact shapes and of the link's hulls [m]."""
 SAME_M = 1e-7
 """Grid size [m]: corners of a mesh that round to the same grid point count as one corner."""
 
@@ -35,8 +35,8 @@ class Surface(NamedTuple):
     Attributes:
         triangles: Corners of the t triangles, t x 3 x 3 [m].
         points: One corner of each connected part of the mesh, p x 3 [m].
-        lower: Least x, y and z [m].
-        upper: Greatest x, y and z [m].
+        lower: Smallest x, y and z of all corners [m].
+        upper: Largest x, y and z of all corners [m].
     """
 
     triangles: np.ndarray
@@ -45,7 +45,7 @@ class Surface(NamedTuple):
     upper: np.ndarray
 
     def holds(self, points: np.ndarray) -> bool:
-        """Returns whether at least one of k points, k x 3 [m], is inside the mesh.
+        """Returns whether the mesh contains at least one of k points, k x 3 [m].
 
         A point is inside if the solid angles of all triangles, seen from the point, add up to the full sphere (Van
         Oosterom and Strackee 1983).
@@ -65,7 +65,7 @@ class Piece(NamedTuple):
 
     Attributes:
         frame: Number of the frame, see `LinkFrames`.
-        pose: Pose of the shape in that frame, 4 x 4.
+        pose: Pose of the shape in the frame, 4 x 4.
         shape: The hpp-fcl object.
         surface: Triangles of a mesh; None for other shapes.
     """
@@ -80,7 +80,7 @@ class Piece(NamedTuple):
 
         Args:
             frame: Number of the other frame.
-            pose: Pose of the present frame in the other frame, 4 x 4.
+            pose: Pose of the shape's current frame in the other frame, 4 x 4.
         """
         return self._replace(frame=frame, pose=pose @ self.pose)
 
@@ -90,7 +90,7 @@ def pieces_of_link(shapes: Sequence[CollisionShape], solids: Sequence[Solid]) ->
 
     Args:
         shapes: The link's shapes as the URDF describes them.
-        solids: Balls around the link's hulls, in the link's frame.
+        solids: Solids that contain the link's hulls, in the link's frame.
 
     Raises:
         ValueError: If a mesh cannot be read, or the extents of the exact shapes and of the hulls differ.
@@ -99,7 +99,7 @@ def pieces_of_link(shapes: Sequence[CollisionShape], solids: Sequence[Solid]) ->
 
 
 def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piece]:
-    """Returns the exact shape of an obstacle in its own frame; see `pieces_of_link`.
+    """Returns the exact shape of an obstacle in the obstacle's frame; see `pieces_of_link`.
 
     The list is empty for planes and point sets, which are measured as hulls.
     """
@@ -122,13 +122,13 @@ def _placed(pieces: list[Piece], solids: Sequence[Solid]) -> list[Piece]:
 def nearest(
     firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarray, within_m: float
 ) -> ClosestPoints | None:
-    """Returns the closest points between two groups of shapes; None if the groups penetrate each other.
+    """Returns the closest points between two groups of shapes; None if the groups intersect.
 
     Args:
         firsts: Shapes of the first group.
         seconds: Shapes of the second group.
-        frames: m frames in the root link, m x 4 x 4.
-        within_m: Largest distance that is measured [m]. If the groups are further apart, the distance is inf.
+        frames: Poses of the m frames of `LinkFrames` in the root frame, m x 4 x 4.
+        within_m: Largest distance that is measured [m]. If the groups are further apart, the returned distance is inf.
     """
     found = ClosestPoints(math.inf, ZERO, ZERO, ZERO)
     request = hppfcl.CollisionRequest()
@@ -154,11 +154,11 @@ def nearest(
 
 
 def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
-    """Returns whether a connected part of `piece` lies inside `other`, if their surfaces do not touch.
+    """Returns whether `other` encloses a connected part of `piece`. The surfaces must not touch.
 
     Args:
-        piece: The piece that may be inside.
-        other: The piece that may enclose it.
+        piece: The piece that may be enclosed.
+        other: The piece that may enclose a part of `piece`.
         pose: Pose of `piece` in the frame of `other`, 4 x 4.
     """
     if other.surface is None:  # a solid for hpp-fcl, whose collision check also detects pieces inside the solid

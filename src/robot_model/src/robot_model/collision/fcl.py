@@ -23,8 +23,8 @@ from .shapes import Obstacle, ObstacleKind, collision_shapes
 from .solids import ClosestPoints, Solid, balls_of, few_balls
 
 TOUCHING_M = 1e-9
-"""Distance between closest points [m] up to which hpp-fcl's normal serves as the direction. At larger distances, the
-normal may be NaN, and the direction is computed from the points."""
+"""Distance between closest points [m] up to which hpp-fcl's normal is used as the direction. At larger distances, the
+direction is computed from the points, since the normal may be NaN."""
 
 
 class Hull(NamedTuple):
@@ -32,9 +32,9 @@ class Hull(NamedTuple):
 
     Attributes:
         frame: Number of the frame, see `LinkFrames`.
-        pose: Pose of the shape in that frame, 4 x 4.
+        pose: Pose of the shape in the frame, 4 x 4.
         shape: The hpp-fcl object.
-        solid: Balls whose convex hull contains the shape, in the shape's own frame.
+        solid: Solid that contains the shape, in the shape's own frame.
     """
 
     frame: int
@@ -133,7 +133,7 @@ def _hull(
 
 
 def primitive(kind: ObstacleKind, size: tuple[float, ...]) -> Any:
-    """Makes an hpp-fcl box, sphere, cylinder or capsule; `size` is that of a `CollisionShape` of the same kind."""
+    """Makes an hpp-fcl box, sphere, cylinder or capsule; for `size`, see `CollisionShape`."""
     if kind == "box":
         return hppfcl.Box(*size)
     if kind == "sphere":

@@ -7,19 +7,19 @@ import numpy as np
 from .solids import Solid
 
 ROUNDING_M = 1e-4
-"""Largest amount by which a distance measured by PyBullet may be too small [m]."""
+"""Largest amount by which distances from PyBullet are too small [m]."""
 
 
 class Separation:
     """Computes lower bounds on the distances of p pairs without measuring the distances.
 
-    A pair is two links, or a link and an obstacle. The distance between two convex shapes is at least their gap along
-    any direction. Along the line between their closest points, the gap equals the distance. So one direction is stored
-    for each combination of two shapes, one from each member, in the frame of the second shape. Before a direction is
-    stored, the bound is -inf.
+    A pair is two links, or a link and an obstacle. The distance between two convex shapes is at least the gap between
+    them along any direction. Along the line between the closest points, the gap equals the distance. So a direction is
+    stored for each combination of a shape of the first member and a shape of the second member, in the frame of the
+    second shape. Before a direction is stored, the bound is -inf.
 
     Args:
-        pairs: For each pair, the shapes of the first member and the shapes of the second member.
+        pairs: Shapes of the first member and shapes of the second member of each pair.
     """
 
     def __init__(self, pairs: Sequence[tuple[Sequence[Solid], Sequence[Solid]]]) -> None:
@@ -55,8 +55,8 @@ class Separation:
 
         Args:
             i: Index of the pair.
-            directions: Candidate directions in the root link, along lines between closest points; signs are arbitrary.
-            frames: m frames in the root link, m x 4 x 4.
+            directions: Candidate directions in the root frame, along lines between closest points, with any sign.
+            frames: Poses of the m frames of `LinkFrames` in the root frame, m x 4 x 4.
         """
         rows = self._rows[i]
         first, second = frames[self._first_frame[rows[0]]], frames[self._second_frame[rows[0]]]
@@ -75,8 +75,8 @@ class Separation:
         """Returns lower bounds on the distances of selected pairs in k configurations, k x len(which) [m].
 
         Args:
-            frames: m frames in each configuration, in the root link, k x m x 4 x 4.
-            which: Indices of at least one pair, in ascending order.
+            frames: Poses of the m frames in the root frame in each configuration, k x m x 4 x 4.
+            which: Ascending indices of the selected pairs; at least one.
         """
         is_asked = np.zeros(len(self._counts), bool)
         is_asked[which] = True
@@ -94,13 +94,13 @@ class Separation:
 
 
 def _balls(solids: Sequence[Solid], size: int = 1) -> np.ndarray:
-    """Stacks the balls of p solids, p x v x 4; solids with fewer than v balls repeat their last ball."""
+    """Stacks the balls of p solids in an array p x v x 4. For solids with fewer than v balls, repeats the last ball."""
     size = max([size, *(len(solid.balls) for solid in solids)])
     balls = [np.pad(solid.balls, ((0, size - len(solid.balls)), (0, 0)), "edge") for solid in solids]
     return np.array(balls).reshape(-1, size, 4)
 
 
 def _extent(balls: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the least and the greatest coordinate of p groups of v balls along d unit vectors, both p x d."""
+    """Returns the smallest and the largest coordinate of p groups of v balls along d unit vectors, both p x d."""
     along, radius = balls[:, :, :3] @ directions.T, balls[:, :, 3:]
     return (along - radius).min(axis=1), (along + radius).max(axis=1)

@@ -38,12 +38,12 @@ class Obstacle(NamedTuple):
     """A convex shape of the environment that a robot must not touch.
 
     Attributes:
-        name: Name of the obstacle in messages. Several shapes of one body may have the same name.
+        name: Name of the obstacle in messages. Several obstacles that represent one body may have the same name.
         kind: Kind of the obstacle. The axis of a cylinder or capsule is z. A plane is the half-space below z = 0. A
             mesh, or a set of points, is replaced by its convex hull.
-        size: Extents along x, y and z, as in the scale of a marker [m]. The z extent of a capsule excludes the round
-            ends. Mesh: scale factors along x, y and z.
-        pose: Pose of the obstacle in the robot's root link.
+        size: Extents along x, y and z, like the field `scale` of a ROS marker [m]. The z extent of a capsule excludes
+            the round ends. Mesh: scale factors along x, y and z.
+        pose: Pose of the obstacle in the robot's root frame.
         mesh_file: Path of the mesh; empty for other kinds.
         corners: The points of kind `points`, in the obstacle's frame [m].
     """
@@ -57,12 +57,12 @@ class Obstacle(NamedTuple):
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """The attributes without name and pose: two obstacles with equal values have the same shape."""
+        """The attributes other than name and pose. If they are equal, two obstacles have the same shape."""
         return self.kind, self.size, self.mesh_file, self.corners
 
     @property
     def link_size(self) -> tuple[float, ...]:
-        """The size in the convention of `CollisionShape`, for the same kind."""
+        """The size of the obstacle in the convention of `CollisionShape.size`."""
         x, y, z = self.size
         if self.kind == "sphere":
             return (max(x, y, z) / 2.0,)
@@ -70,7 +70,7 @@ class Obstacle(NamedTuple):
 
 
 def collision_shapes(document: UrdfDocument, link: str) -> list[CollisionShape]:
-    """Returns a link's collision shapes in the file's order; leaves out kinds other than `LinkShapeKind`.
+    """Returns a link's collision shapes in the file's order, without shapes whose kind is not a `LinkShapeKind`.
 
     Raises:
         ConfigError: If a mesh with a `package://` path belongs to an unknown package or does not exist.

@@ -1,4 +1,4 @@
-"""Solids: convex hulls of a few balls, each of which contains a collision shape."""
+"""Solids, which are convex hulls of a few balls. Each solid contains a collision shape."""
 
 import math
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ from robot_model.geometry import Vector
 MESH_MARGIN_M = 1e-3
 """Thickness that PyBullet adds to convex meshes [m]."""
 COARSE_M = 2e-3
-"""Corners of a mesh are added until each dropped corner is at most this far from a line between two kept corners [m].
-The balls' radius includes the distance that remains."""
+"""Corners of a mesh are kept until each other corner is at most this far from a line between two kept corners [m].
+The remaining distance is added to the radius of the balls."""
 MAX_CORNERS = 48
-"""Largest number of kept corners of a mesh, even if dropped corners are then further away than `COARSE_M`."""
+"""Largest number of kept corners of a mesh, even if other corners are then further away than `COARSE_M`."""
 SIDES = 32
 """Number of sides of the prism around a cylinder."""
 CUBE = 2.0 * ((np.arange(8)[:, None] >> np.arange(3)) & 1) - 1.0
@@ -23,7 +23,7 @@ CUBE = 2.0 * ((np.arange(8)[:, None] >> np.arange(3)) & 1) - 1.0
 
 
 class ClosestPoints(NamedTuple):
-    """The points at which two shapes are nearest to each other, in the robot's root link.
+    """The points at which two shapes are nearest to each other, in the robot's root frame.
 
     Attributes:
         distance: Distance between the surfaces; negative if the shapes penetrate each other [m].
@@ -39,12 +39,12 @@ class ClosestPoints(NamedTuple):
 
 
 class Solid(NamedTuple):
-    """A convex shape that moves with a frame.
+    """The convex hull of balls, or a half-space, which moves with a frame.
 
     Attributes:
         frame: Number of the frame, see `LinkFrames`.
-        balls: v balls, v x 4: centre x, y and z in that frame, and radius [m]. Their convex hull contains the shape.
-        normal: Outward normal of a half-space, whose boundary contains the first ball's centre. None for other shapes.
+        balls: v balls, v x 4: centre x, y and z in the frame, and radius [m].
+        normal: Outward normal of a half-space whose boundary contains the first ball's centre. None for a convex hull.
     """
 
     frame: int
@@ -53,7 +53,7 @@ class Solid(NamedTuple):
 
     @property
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest x, y and z [m]; inf and -inf for a solid without balls."""
+        """Smallest and largest x, y and z of the solid [m]; inf and -inf for a solid without balls."""
         places, radius = self.balls[:, :3], self.balls[:, 3:]
         return (places - radius).min(axis=0, initial=np.inf), (places + radius).max(axis=0, initial=-np.inf)
 
@@ -62,7 +62,7 @@ class Solid(NamedTuple):
 
         Args:
             frame: Number of the other frame.
-            pose: Pose of the present frame in the other frame, 4 x 4.
+            pose: Pose of the solid's current frame in the other frame, 4 x 4.
         """
         turn, shift = pose[:3, :3], pose[:3, 3]
         balls = np.column_stack((self.balls[:, :3] @ turn.T + shift, self.balls[:, 3]))
@@ -74,12 +74,15 @@ class Solid(NamedTuple):
 
 
 def extent_of(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the least and greatest x, y and z of shapes that are all expressed in the same frame [m]."""
+    """Returns the smallest and largest x, y and z of solids that are all expressed in the same frame [m]."""
     return Solid(0, np.concatenate([solid.balls for solid in solids] or [np.empty((0, 4))])).extent
 
 
 def box_of(lower: np.ndarray, upper: np.ndarray) -> Solid:
-    """Returns the box from the corner `lower` to the corner `upper` [m]; a ball of NaN if `lower` exceeds `upper`."""
+    """Returns the box from the corner `lower` to the corner `upper` [m].
+
+    If `lower` exceeds `upper`, the solid has one ball whose numbers are NaN.
+    """
     if (lower > upper).any():
         return Solid(0, np.full((1, 4), np.nan))
     corners = (lower + upper) / 2.0 + CUBE * (upper - lower) / 2.0
@@ -87,9 +90,9 @@ def box_of(lower: np.ndarray, upper: np.ndarray) -> Solid:
 
 
 def balls_of(kind: str, size: tuple[float, ...]) -> np.ndarray:
-    """Returns balls whose convex hull contains a box, sphere, capsule or cylinder, v x 4; 0 x 4 for other kinds.
+    """Returns v balls whose convex hull contains a box, sphere, capsule or cylinder, v x 4; 0 x 4 for other kinds.
 
-    `size` is that of a `CollisionShape`. Boxes, spheres and capsules are exact; a cylinder becomes a prism around it.
+    For `size`, see `CollisionShape`. Boxes, spheres and capsules are exact; a cylinder is enclosed in a prism.
     """
     if kind == "box":
         half = np.array(size) / 2.0
@@ -107,7 +110,7 @@ def balls_of(kind: str, size: tuple[float, ...]) -> np.ndarray:
 
 
 def few_balls(points: Sequence[Vector]) -> np.ndarray:
-    """Selects some corners of a mesh, and returns balls around them whose convex hull contains the mesh, v x 4.
+    """Selects v corners of a mesh, and returns balls at these corners whose convex hull contains the mesh, v x 4.
 
     Corners are selected one after the other. The next corner is the one that is furthest from all line segments between
     the corners selected so far.

@@ -23,7 +23,7 @@ from .elements import (
 def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
     """Returns the text of a URDF with all or some of the links, and the joints between them, but without shapes.
 
-    The result loads in about 0.5 ms, while a robot with meshes may take 100 ms. Every link gets unit mass at its own
+    The result loads in about 0.5 ms, while a robot with meshes may take 100 ms. Every link gets unit mass at the link's
     origin, so that PyBullet's centre-of-mass frames coincide with the link frames.
 
     Args:
@@ -43,12 +43,12 @@ def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -
 def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
     """Returns the text of a URDF in which continuous joints become revolute joints with limits 0 and 0.
 
-    Limits 0 and 0 mean that the joint is unlimited. Pinocchio then represents such a joint by one number, instead of by
-    sine and cosine.
+    Limits 0 and 0 mean that the joint is unlimited. Pinocchio represents such a joint by one number, instead of sine
+    and cosine.
 
     Args:
         document: The URDF.
-        base: Link that becomes the new root; by default the root stays.
+        base: Link that becomes the new root; by default, the root does not change.
 
     Raises:
         ValueError: If a joint between `base` and the old root is invalid; the message names the joint.
@@ -73,7 +73,7 @@ def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
 
 
 def _reroot(robot: Element, base: str) -> None:
-    """Makes the link `base` the root of a robot element: reverses all joints between `base` and the old root.
+    """Makes the link `base` the root of a robot element by reversing all joints between `base` and the old root.
 
     Extra links and fixed joints are added, so that the same joint positions give the same poses as before.
     """

@@ -1,4 +1,4 @@
-"""Reads URDF files into plain data, and disabled collisions from SRDF files."""
+"""Reads URDF files, and the disabled collisions in SRDF files."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -44,21 +44,21 @@ class Attribute(NamedTuple):
 
 
 class UrdfDocument:
-    """The links and joints of a URDF file. Callers must not change its attributes, which are shared.
+    """The links and joints of a URDF file.
 
     Like PyBullet, the parser ignores text outside the robot element, and characters that XML does not allow. Documents
-    with the same content share their elements, and compare equal.
+    with the same content compare equal and share their elements, so callers must not change them.
 
     Args:
         path: Path of the URDF; its meshes need not exist.
-        source: File to read instead of `path`; messages still name `path`.
+        source: File to read instead of `path`; error messages name `path`.
         not_xml: Start of the error message for a file that is not well-formed.
 
     Attributes:
         tag: Tag of the top element, `robot` in a URDF.
         links: Names of all links.
         joint_types: Type of each joint by name, such as `revolute` or `fixed`.
-        edges: Each joint with the two links that it connects, in the file's order.
+        edges: Names of each joint and of the two links that the joint connects, in the file's order.
         meshes: File names of all meshes, as written in the file.
         source: Path of the file that was read.
         root: The top element.
@@ -96,7 +96,7 @@ class UrdfDocument:
 
     @cached_property
     def mimics(self) -> dict[str, Mimic]:
-        """Relation of each mimic joint to the joint that it follows, by the mimic joint's name.
+        """Relation of each mimic joint to the followed joint, indexed by mimic joint name.
 
         Raises:
             ValueError: If a value of a relation is invalid; the message names the joint.
@@ -114,7 +114,7 @@ class UrdfDocument:
         return list(dict.fromkeys(mesh.get("filename", "") for mesh in found))
 
     def attributes(self) -> Iterator[Attribute]:
-        """Yields all XML attributes of the top element and of the elements in it."""
+        """Yields all XML attributes of the top element and of all nested elements."""
         for key, text in self.root.attrib.items():
             yield Attribute(self.tag, "robot", key, text, True)
         for owner in self.root:
@@ -152,7 +152,7 @@ class UrdfDocument:
         return [str(mesh_file(name, self.source)) for name in dict.fromkeys(names) if name]
 
     def joints_above(self, link: str) -> Iterator[tuple[str, str, str]]:
-        """Yields name, type and parent link of each joint between a link and the root, starting at the link."""
+        """Yields the name, type and parent link of each joint on the way from a link up to the root."""
         above = {end_of(joint, "child"): joint for joint in self.joint_elements}
         while (joint := above.pop(link, None)) is not None:
             link = end_of(joint, "parent")
@@ -174,7 +174,7 @@ class UrdfDocument:
 
 @lru_cache(maxsize=32)
 def _robot_in(data: bytes) -> Element:
-    """Parses the robot element from a file's content; results are cached."""
+    """Parses the robot element in a file's content; results are cached."""
     return parse(data.decode(errors="replace"))
 
 
@@ -199,7 +199,7 @@ def _parts_of(root: Element) -> _Parts:
 
 
 def mimics_of(path: str) -> dict[str, Mimic]:
-    """Returns the mimic relations of a URDF file, see `UrdfDocument.mimics`; empty if the file cannot be read.
+    """Returns a URDF file's mimic relations, see `UrdfDocument.mimics`; an empty dict if the file cannot be read.
 
     Raises:
         ValueError: If a value of a relation is invalid; the message names the joint.
@@ -210,7 +210,7 @@ def mimics_of(path: str) -> dict[str, Mimic]:
 
 
 def disabled_collisions(path: str) -> set[frozenset[str]]:
-    """Reads an SRDF file, and returns the pairs of links whose collisions it disables.
+    """Returns the pairs of links whose collisions an SRDF file disables.
 
     Raises:
         ConfigError: If the file cannot be read or is not well-formed.

@@ -1,4 +1,4 @@
-"""Parses the XML of a URDF, reads joints from XML elements, and writes elements."""
+"""Parses the XML of a URDF, reads joints from XML elements, and makes XML elements."""
 
 import math
 import re
@@ -24,7 +24,7 @@ MAX_TAGS = 50_000
 MAX_NESTED = 100
 """Largest nesting depth of elements; files with deeper nesting are rejected as not well-formed."""
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet accepts them."""
+"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets), but PyBullet accepts."""
 _ROBOT, _END_OF_ROBOT = re.compile(r"<robot\b"), re.compile(r"</robot\s*>")
 _DEFAULT = re.compile(r"\$\(optenv \w+ ([^()]*)\)")
 """Xacro expression for an environment variable with a default value."""
@@ -34,7 +34,7 @@ _ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Mimic(NamedTuple):
-    """Relation of a mimic joint to the followed joint `joint`.
+    """Relation of a mimic joint to the joint called `joint`, which the mimic joint follows.
 
     Position of the mimic joint = `multiplier` * position of the followed joint + `offset`.
     """
@@ -81,7 +81,7 @@ class UrdfJoint(NamedTuple):
 
     @property
     def is_revolute(self) -> bool:
-        """Whether a moving joint turns about its axis; false for prismatic joints only."""
+        """Whether a moving joint turns about its axis: true for revolute and continuous, false for prismatic joints."""
         return self.type != "prismatic"
 
     @property
@@ -93,7 +93,7 @@ class UrdfJoint(NamedTuple):
 def parse(text: str) -> Element:
     """Finds the robot element in a text in the same way as PyBullet, and parses it.
 
-    The time is linear in the length of the text.
+    The computing time is proportional to the length of the text.
 
     Raises:
         ExpatError: If the text is not well-formed.
@@ -120,7 +120,7 @@ def parse(text: str) -> Element:
 
 
 def _without_comments(text: str) -> str:
-    """Replaces comments by spaces; unlike XML, PyBullet allows `--` in comments."""
+    """Replaces comments by spaces, also comments with `--`, which PyBullet allows but XML does not."""
     parts, end = [], 0
     while (start := text.find("<!--", end)) >= 0 and (stop := text.find("-->", start + 4)) >= 0:
         parts += [text[end:start], _blank(text[start : stop + 3])]
@@ -138,7 +138,7 @@ def _end_of_robot(text: str) -> int:
 
 
 def _blank(text: str) -> str:
-    """Replaces all characters but newlines by spaces, so that the parser's messages have the file's line and column."""
+    """Replaces all characters but newlines by spaces. This keeps lines and columns in the parser's messages right."""
     return "\n".join(" " * len(line) for line in text.split("\n"))
 
 
@@ -151,7 +151,7 @@ def _check_depth(root: Element) -> None:
 
 
 def as_read(element: Element) -> Element:
-    """Copies an element with its attributes; leaves out text, and nested elements that PyBullet does not read."""
+    """Copies an element with its attributes and nested elements, without text and elements that PyBullet ignores."""
     result = Element(element.tag, element.attrib)
     result.extend([as_read(child) for child in element if child.tag in READ])
     return result
@@ -228,7 +228,7 @@ def _number(joint: Element, part: str, key: str, default: str) -> float:
 
 
 def _numbers(joint: Element, part: str, key: str, default: str) -> list[float]:
-    """Reads as many finite numbers from an attribute as the default text has; see `read_vector`."""
+    """Reads finite numbers from an attribute, as many as the default text contains; see `read_vector`."""
     text, count = _attribute(joint, part, key, default), len(default.split())
     try:
         values = [float(word) for word in text.split()]
@@ -246,7 +246,7 @@ def _attribute(element: Element, part: str, key: str, default: str = "") -> str:
 
 
 def joint_element(joint: UrdfJoint) -> Element:
-    """Writes a joint as an XML element that has only the parts needed for kinematics."""
+    """Makes a joint element that contains only the parts needed for kinematics."""
     unlimited = joint.lower == -math.inf
     parts = [new_element("parent", link=joint.parent), new_element("child", link=joint.child)]
     parts.append(new_element("origin", xyz=words(joint.xyz), rpy=words(joint.rpy)))
@@ -259,7 +259,7 @@ def joint_element(joint: UrdfJoint) -> Element:
 
 
 def inertial(mass: str) -> Element:
-    """Makes an inertial element whose centre of mass is the link's origin.
+    """Makes an inertial element with the centre of mass at the link's origin.
 
     Args:
         mass: The mass [kg]. The same number is the moment of inertia about each axis [kg m^2].
@@ -269,14 +269,14 @@ def inertial(mass: str) -> Element:
 
 
 def new_element(tag: str, /, *parts: Element, **attributes: str) -> Element:
-    """Makes an element with the child elements `parts`, and attributes."""
+    """Makes an element with child elements (`parts`) and attributes."""
     element = Element(tag, attributes)
     element.extend(parts)
     return element
 
 
 def words(vector: Vector) -> str:
-    """Formats three numbers as the text of an attribute, exact to the last bit."""
+    """Formats three numbers as an attribute's text, without loss of precision."""
     return " ".join(map(repr, vector))
 
 

@@ -14,7 +14,7 @@ PACKAGE = "package://"
 
 @lru_cache(maxsize=1)
 def _folder() -> Path:
-    """Makes the temporary folder of this process, which is removed when the process ends."""
+    """Makes this process's temporary folder, which is removed when the process ends."""
     return Path(temporary_folder("urdf").name)
 
 
@@ -30,20 +30,22 @@ def write_description(text: str) -> str:
 
 
 def is_temporary(path: str) -> bool:
-    """Returns whether `write_description` wrote a file in this process."""
+    """Returns whether a file was written by `write_description` in this process."""
     return Path(path).parent == _folder()
 
 
 def found_by_ros(mesh: str, source: Path) -> str | Path:
-    """Finds a mesh or texture such that ROS can load it, too.
+    """Returns the address or path with which ROS can load a mesh or texture.
+
+    Relative paths start at the folder of the URDF. If the ROS package is unknown or lacks the file, the URDF's folder
+    and all folders above are searched.
 
     Args:
         mesh: File name of the mesh or texture, as written in the URDF.
         source: Path of the URDF.
 
     Returns:
-        The address as text if ROS can resolve it; otherwise a path. Relative paths start at the folder of the URDF. If
-        the ROS package is unknown or lacks the file, the URDF's folder and all folders above are searched.
+        The unchanged address if ROS can resolve it, or a path.
 
     Raises:
         ConfigError: If the package is unknown, and the file is not in the URDF's folder or a folder above.
@@ -59,7 +61,7 @@ def found_by_ros(mesh: str, source: Path) -> str | Path:
 
 
 def found_mesh(name: str, source: Path) -> Path:
-    """Finds a mesh in its ROS package, or in the folders that PyBullet searches: the URDF's folder and those above.
+    """Finds a mesh in its ROS package, or, like PyBullet, in the URDF's folder and all folders above.
 
     Args:
         name: File name of the mesh, as written in the URDF.
@@ -79,7 +81,7 @@ def found_mesh(name: str, source: Path) -> Path:
 
 
 def mesh_file(mesh: str, source: Path) -> Path:
-    """Finds a mesh in its ROS package or relative to the URDF; a `package://` mesh also in the folders above the URDF.
+    """Finds a mesh in its ROS package or relative to the URDF. Searches `package://` meshes also above the URDF.
 
     Args:
         mesh: File name of the mesh, as written in the URDF.
@@ -103,7 +105,7 @@ def mesh_file(mesh: str, source: Path) -> Path:
 
 
 def beside_or_above(name: str, source: Path) -> Path | None:
-    """Searches a file as PyBullet does: in the folder of the URDF `source`, then in all folders above.
+    """Searches for a file like PyBullet: in the folder of the URDF `source`, then in all folders above.
 
     Returns:
         Path of the file; None if the file is not found.
@@ -118,10 +120,10 @@ def _with_two_slashes(mesh: str) -> str:
 
 
 def _near(mesh: str, source: Path) -> Path | None:
-    """Searches a `package://` mesh in the folder of the URDF and in all folders above, without using ROS packages.
+    """Searches for a `package://` mesh in the URDF's folder and all folders above, without using ROS packages.
 
-    PyBullet searches these folders, too, and the robots in PyBullet's data rely on the search. The search also finds
-    meshes of a package that is hidden by another package with the same name.
+    The robots in PyBullet's data rely on this search, which PyBullet also does. The search also finds meshes of a
+    package that is hidden by another package with the same name.
     """
     return beside_or_above(mesh.removeprefix(PACKAGE), source.resolve()) if mesh.startswith(PACKAGE) else None
 

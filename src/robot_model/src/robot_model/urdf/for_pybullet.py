@@ -1,4 +1,4 @@
-"""Modifies copies of a URDF so that PyBullet can load them; does not import PyBullet."""
+"""Makes modified copies of a URDF that PyBullet can load; does not import PyBullet."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,13 @@ log = logging.getLogger(__name__)
 WORLD_LINK = "world"
 """Link name that PyBullet treats specially: a link `world` without inertia has mass 0, and a root `world` is fixed."""
 LEAST_KG = "1e-06"
-"""Mass assigned to a floating root without inertia and shape [kg]. PyBullet would fix a massless root to the world."""
+"""Mass assigned to a free root without inertia and shape [kg]. PyBullet would fix a massless root to the world."""
 Files = tuple[tuple[tuple[str, str], str], ...]
-"""Pairs that map an element, given by tag and `filename` attribute, to the absolute path of its file."""
+"""Pairs of an element, given by tag and `filename` attribute, and the absolute path of the element's file."""
 
 
 def files_of(document: UrdfDocument) -> Files:
-    """Finds the meshes and textures that PyBullet reads with a URDF, and leaves out missing textures.
+    """Returns the paths of the meshes and textures that PyBullet reads with a URDF, without missing textures.
 
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
@@ -55,11 +55,11 @@ def _named_files(document: UrdfDocument) -> tuple[tuple[str, str], ...]:
 def for_pybullet(document: UrdfDocument, files: Files) -> Element:
     """Copies the elements of a URDF that PyBullet reads, and replaces file names by absolute paths.
 
-    PyBullet itself does not resolve names of ROS packages. The result depends only on the arguments.
+    PyBullet itself does not resolve names of ROS packages.
 
     Args:
         document: The URDF.
-        files: Result of `files_of`; elements whose file is not in this list are left out.
+        files: Result of `files_of`; elements whose file is not in `files` are left out.
     """
     robot, known = as_read(document.root), dict(files)
     for parent in list(robot.iter()):
@@ -73,7 +73,7 @@ def for_pybullet(document: UrdfDocument, files: Files) -> Element:
 
 
 def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> None:
-    """Adds a chain of massless links and joints above the root of a robot.
+    """Adds a chain of massless links and of joints above the root of a robot.
 
     Args:
         robot: Top element of the URDF, which is changed in place.
@@ -92,16 +92,16 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
 def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
     """Returns the masses to assign to frames: links without inertia and shape, which PyBullet would give 1 kg each.
 
-    Most frames get mass 0. A free root gets `LEAST_KG` if a link with mass is fixed to it, since PyBullet needs some
-    mass on free bodies. Two kinds of frames keep 1 kg, and are left out of the result. These are a frame on a moving
-    joint that carries no other mass, and a free root without mass fixed to it.
+    Most frames get mass 0. A free root gets `LEAST_KG` if a link with mass is fixed to the root, since PyBullet needs
+    some mass on free bodies. The result leaves out frames that keep 1 kg: a frame on a moving joint that does not carry
+    another mass, and a free root to which no mass is fixed.
 
     Args:
         document: The URDF.
         is_fixed: Whether the base is fixed to the world.
 
     Returns:
-        Mass of each frame by link name, as text [kg].
+        Mass of each frame as text [kg], indexed by link name.
     """
     frames = document.frames - {WORLD_LINK}
     if not frames:
@@ -136,14 +136,14 @@ def _from_the_root(document: UrdfDocument) -> list[str]:
 
 
 def weigh_frames(robot: Element, masses: Mapping[str, str]) -> None:
-    """Adds inertial elements to links of a robot, with masses by link name as text [kg]; see `frame_masses`."""
+    """Adds inertial elements with the result of `frame_masses` to links of a robot."""
     for link in robot.findall("link"):
         if (mass := masses.get(link.get("name", ""))) is not None:
             link.append(inertial(mass))
 
 
 def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
-    """Returns the names of the movable links to which PyBullet assigns 1 kg because the URDF has no mass for them."""
+    """Returns the names of the movable links to which PyBullet assigns 1 kg because the URDF does not give a mass."""
     above = {edge.child: edge for edge in document.edges}
     moving: set[str] = set()
     for link in _from_the_root(document):
@@ -157,7 +157,7 @@ def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
 
 
 def put_root_first(robot: Element) -> None:
-    """Moves the root link before all other links; otherwise PyBullet crashes with URDF_MAINTAIN_LINK_ORDER."""
+    """Moves the root link before all other links, without which PyBullet crashes with URDF_MAINTAIN_LINK_ORDER."""
     children = {end_of(joint, "child") for joint in robot.findall("joint")}
     for root in [link for link in robot.findall("link") if link.get("name") not in children]:
         robot.remove(root)

@@ -19,10 +19,10 @@ ROOT_LINK = "world"
 
 
 def description_for_ros(path: str) -> str:
-    """Returns the text of a URDF such that ROS nodes can use it without knowing the folder of the file.
+    """Returns the text of a URDF in a form that ROS nodes can use without knowing the folder of the file.
 
-    Relative paths of meshes become `file://` addresses; `package://` addresses stay if ROS can resolve them. Meshes
-    with missing textures are replaced by copies without these textures.
+    Relative paths of meshes become `file://` addresses. `package://` addresses that ROS can resolve do not change.
+    Meshes with missing textures are replaced by copies without these textures.
 
     Args:
         path: Path of the URDF.
@@ -37,8 +37,8 @@ def joined_for_ros(robots: Mapping[str, tuple[str, Pose]]) -> str:
     """Joins several robots into one URDF with the root link `world`, and returns the text.
 
     Args:
-        robots: For each robot name NAME, the path of its URDF, and the pose of its root link in the world. Names of its
-            links and joints get the prefix `NAME_`.
+        robots: Path of the URDF, and pose of the root link in the world, indexed by robot name NAME. Names of the
+            robot's links and joints get the prefix `NAME_`.
 
     Raises:
         ConfigError: If a file is not a URDF, or a mesh belongs to an unknown package.
@@ -71,10 +71,10 @@ def _for_ros(document: UrdfDocument) -> Element:
 
 
 def _with_existing_textures(mesh: Path) -> Path:
-    """Returns a mesh that does not name missing textures, since RViz reports missing textures as errors.
+    """Returns the path of a mesh without missing textures, which RViz would report as errors.
 
-    If an OBJ file names missing textures, its copy in the cache is returned, whose materials lack the lines that name
-    them. Otherwise the mesh itself is returned.
+    If an OBJ file names missing textures, the path is that of a copy in the cache, from whose materials the lines with
+    missing textures are removed. Otherwise, returns the path of the mesh itself.
     """
     try:
         data = read_file(mesh) if mesh.suffix.lower() == ".obj" else b""
@@ -100,5 +100,5 @@ def _with_existing_textures(mesh: Path) -> Path:
 
 
 def _texture_file(mesh: Path, texture: str) -> str:
-    """Returns the file name in a texture entry, which may start with options; empty if the file does not exist."""
+    """Returns the file name in a texture entry, which may start with options; "" if the file does not exist."""
     return next((name for name in (texture, *texture.split()[-1:]) if (mesh.parent / name).is_file()), "")

@@ -23,14 +23,14 @@ MAX_LINKS = 2000
 MAX_SHAPES = 1000
 """Largest number of visual and collision shapes, summed over all links."""
 MAX_ATTRIBUTES = 100_000
-"""Largest number of XML attributes in a file. A file with more is reported as faulty; the rest is not checked."""
+"""Largest number of XML attributes in a file. A file with more attributes is faulty; the others are not checked."""
 MAX_PROBLEMS = 20
 """Largest number of faults that are reported for one file."""
 _NAMES = {("robot", "name"), ("link", "name"), ("joint", "name"), ("material", "name"), ("joint", "type")}
 _TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
 _UNSAFE = re.compile(r"[%\x00-\x1f\x7f-\x9f]")
-"""Characters that are not allowed in attribute values: control characters, and %, since PyBullet's log passes values to
-printf as format."""
+"""Characters that are not allowed in attribute values: control characters, and %, since PyBullet's log uses values as
+format strings of printf."""
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
 _NUMBERS = {
     **dict.fromkeys((("origin", "xyz"), ("box", "size"), ("sphere", "radius")), MAX_COORDINATE_M),
@@ -49,9 +49,9 @@ _NUMBERS = {
         )
     },
 }
-"""Largest allowed magnitude of a number, by tag and attribute name."""
+"""Largest allowed magnitude of a number, indexed by tag and attribute name."""
 _VECTORS = {("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("box", "size")}
-"""Tag and name of the attributes that must have three numbers."""
+"""Tags and names of the attributes that must have three numbers."""
 _SHAPES = {
     "box": ("size",),
     "sphere": ("radius",),
@@ -60,7 +60,7 @@ _SHAPES = {
     "plane": ("normal",),
     "mesh": ("filename",),
 }
-"""Required attributes of each shape, by tag."""
+"""Required attributes of each shape, indexed by tag."""
 _LIMITED = ("revolute", "prismatic")
 _INERTIA = ("ixx", "iyy", "izz")
 _CONTACT = (
@@ -81,7 +81,7 @@ def check_structure(document: UrdfDocument) -> None:
 
 @lru_cache(maxsize=32)
 def structure_problems(document: UrdfDocument) -> tuple[str, ...]:
-    """Returns up to `MAX_PROBLEMS` messages, one for each fault in the tree of links, in names, numbers or texts."""
+    """Returns up to `MAX_PROBLEMS` messages, one for each fault in the link tree, names, numbers or texts of a URDF."""
     return tuple(islice(_problems(document), MAX_PROBLEMS))
 
 
@@ -109,7 +109,7 @@ def _name_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _type_problems(document: UrdfDocument) -> Iterator[str]:
-    """Yields a message for each joint without a valid type; PyBullet's own message for this fault is broken."""
+    """Yields a message for each joint without a valid type, since PyBullet's own message for this fault is broken."""
     for joint in document.joint_elements:
         if (kind := joint.get("type", "")) not in _TYPES:
             name = shortened(joint.get("name", ""))
@@ -174,7 +174,7 @@ def _text_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _text_problem(attribute: Attribute) -> str:
-    """Returns why an attribute's text is unsafe for PyBullet, which copies it to its stack and log; empty if safe."""
+    """Returns the reason why PyBullet cannot safely copy an attribute's text to its stack and log; "" if it can."""
     _, tag, key, text, _ = attribute
     longest = LONGEST_NAME if (tag, key) in _NAMES or key == "link" else LONGEST_TEXT
     if (size := len(text.encode())) > longest:
@@ -185,7 +185,7 @@ def _text_problem(attribute: Attribute) -> str:
 
 
 def numbers_in(text: str) -> list[float]:
-    """Reads numbers like PyBullet: each word gives the number at its beginning; words without a number are skipped."""
+    """Reads numbers like PyBullet: reads the number at the beginning of each word, and skips other words."""
     return [float(match[0]) for word in text.split() if (match := _NUMBER.match(word))]
 
 
@@ -205,9 +205,9 @@ def _number_problem(tag: str, key: str, text: str) -> str:
 
 
 def missing_parts(document: UrdfDocument) -> Iterator[str]:
-    """Yields a message for each missing element or attribute that PyBullet requires; the message names link or joint.
+    """Yields a message for each missing element or attribute that PyBullet requires.
 
-    PyBullet's own message is only "Cannot load URDF file".
+    The message names the link or joint, while PyBullet's own message is only "Cannot load URDF file".
     """
     if "name" not in document.root.attrib:
         yield "<robot> has no name"
@@ -244,9 +244,9 @@ def _link_faults(link: Element) -> Iterator[str]:
 
 
 def _shape_faults(part: Element) -> Iterator[str]:
-    """Yields a message for each part that PyBullet requires and that the first shape of a visual or collision lacks.
+    """Yields a message for each required part that the first shape of a visual or collision element lacks.
 
-    PyBullet reads only the first shape.
+    PyBullet only reads the first shape.
     """
     shapes = [shape for shape in part.iterfind("geometry/*") if shape.tag in READ]
     if not shapes:
