@@ -152,7 +152,7 @@ class DeviceConformance:
 
     @pytest.mark.parametrize("share", (1.0, -1.0))
     def test_each_axis_moves_in_both_directions_and_back(self, reader: Reader, share: float) -> None:
-        """Each axis has the sign of its motion, and returns to rest when released. All other axes stay at rest."""
+        """Each axis's value has the sign of the motion, and returns to rest afterwards. Other axes stay at rest."""
         rest = reader.device.at_rest().axes
         for axis in self.moves:
             self.move(axis, share)

@@ -74,7 +74,7 @@ class Device(ABC):
     def read(self, timeout_s: float) -> Reading | None:
         """Waits for a new reading and returns it; None if no new reading arrives within the timeout.
 
-        The first reading after `open` is the present state, as soon as the device knows it.
+        The first reading after `open` contains the present state, and arrives as soon as the device knows this state.
 
         Args:
             timeout_s: Longest time to wait [s]; 0 does not wait.

@@ -66,7 +66,7 @@ class WatchedInput:
         return str(self._subscriber.resolved_name)
 
     def has_ceased(self, consequence: str) -> bool:
-        """Returns whether the input has ceased, and logs a warning with the consequence if so.
+        """Returns whether the input has ceased. If it has, logs a warning that contains the text `consequence`.
 
         Returns False before the first message.
         """

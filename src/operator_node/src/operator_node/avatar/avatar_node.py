@@ -1,4 +1,4 @@
-"""`avatar_node.py`: converts segments of a person to joint targets and a base frame of an avatar."""
+"""`avatar_node.py`: converts a person's segment poses to an avatar's joint targets and TF frame of the base."""
 
 import threading
 import time
@@ -50,7 +50,7 @@ class AvatarParameters(ConfigModel):
 
 
 class AvatarNode:
-    """Makes an avatar follow the motion of a person, as long as segments arrive.
+    """Makes an avatar follow the motion of a person, as long as messages with the person's segment poses arrive.
 
     Raises:
         ConfigError: If a parameter is wrong.

@@ -39,13 +39,13 @@ def human_urdf(height_m: float, mass_kg: float, offsets: Array | None = None) ->
     """Returns the URDF of a person. Links are named as in `SEGMENTS`, joints as in `HINGES`.
 
     All joints are at 0 in the T-pose. The frame of a link equals the frame of its segment. Each segment has a simple
-    shape for display and collision. Its thickness follows from the segment's mass, length and density.
+    shape for display and collision. The shape's thickness follows from the segment's mass, length and density.
 
     Args:
         height_m: Height of the person [m].
         mass_kg: Mass of the person [kg].
-        offsets: Origin of each segment in its parent's frame (23 x 3) [m], such as from `measured_offsets`; None: from
-            the tables.
+        offsets: Origin of each segment in its parent's frame (23 x 3) [m], such as from `measured_offsets`; by default
+            from the tables.
 
     Raises:
         ValueError: If height or mass is out of range, or an offset is invalid.

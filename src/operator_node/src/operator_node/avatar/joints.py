@@ -104,7 +104,7 @@ LOWER, UPPER = np.array([limits for joint in JOINTS for limits in joint.limits])
 
 
 def segment_frame(offsets: Array, position: Array, quat_xyzw: Array, hinges: dict[str, float]) -> SegmentFrame:
-    """Returns the segments of a person by forward kinematics.
+    """Returns the segment poses of a person, computed by forward kinematics.
 
     Args:
         offsets: Origin of each segment in its parent's frame (23 x 3) [m].

@@ -1,4 +1,4 @@
-"""Maps the segments of a person to the base and the hinges of an avatar, and limits the speeds of the avatar."""
+"""Maps the segment poses of a person to the base and the hinges of an avatar, and limits the speeds of the avatar."""
 
 import math
 from typing import NamedTuple
@@ -45,7 +45,7 @@ class AvatarPlace(NamedTuple):
 
 
 class Retargeting:
-    """Computes poses of an avatar from the frames of one person. Each person needs a separate object.
+    """Computes poses of an avatar from the motion-capture frames of one person. Each person needs a separate object.
 
     The three hinge angles of a joint are computed in closed form from the orientation of a segment in its parent:
     R = R_i(a) R_j(b) R_k(c) has the solutions (a, b, c) and (a + pi, pi - b, c + pi), plus full turns. The solution
@@ -57,7 +57,7 @@ class Retargeting:
 
     Args:
         offsets: Origin of each segment of the avatar in its parent's frame (23 x 3) [m].
-        place: Initial place of the avatar, at the first frame; None: the place of the person.
+        place: Place of the avatar at the first frame; None for the place of the person.
     """
 
     def __init__(self, offsets: Array, place: AvatarPlace | None = None) -> None:
@@ -78,7 +78,7 @@ class Retargeting:
             self._last = np.array(hinges, dtype=float).reshape(-1, 3)
 
     def pose(self, frame: SegmentFrame) -> AvatarPose:
-        """Returns the avatar's pose for a frame of the person.
+        """Returns the avatar's pose for a motion-capture frame of the person.
 
         Raises:
             ValueError: If the ratio of the leg lengths is outside `LEG_RATIOS`.

@@ -1,7 +1,7 @@
 """Topics of devices in addition to `joy`: the base class, and the topics of joystick, keyboard and 6-D mouse.
 
 Most topics of the joystick are named as in ROS's `joy_node`, those of the 6-D mouse as in `spacenav_node`. The topics
-of the keyboard are named as in the keyboard driver that the authors' release uses.
+of the keyboard are named as in the keyboard driver that this project's original release uses.
 """
 
 import math
@@ -42,7 +42,7 @@ class DeviceTopics:
 
 
 class JoystickTopics(DeviceTopics):
-    """Rumbles the joystick as `joy/set_feedback` requests, and moves a virtual gamepad by messages on `joy/virtual`."""
+    """Makes the joystick rumble on request (`joy/set_feedback`), and moves a virtual gamepad (`joy/virtual`)."""
 
     device: Joystick
 

@@ -52,7 +52,7 @@ class Joystick(Device):
     """A joystick or gamepad that is read through SDL.
 
     Axes are positive to the left and up; a trigger is 1 at rest and -1 when it is fully pressed. As in `joy_node`, each
-    hat adds two axes after those of the sticks.
+    hat adds two axes after the axes of the sticks.
 
     Attributes:
         is_virtual: Whether a virtual gamepad is created when the device is opened.

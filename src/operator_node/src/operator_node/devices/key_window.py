@@ -98,7 +98,7 @@ class PendingRelease(NamedTuple):
     Attributes:
         keycode: X's number for the position of the key on the keyboard.
         time: X's time stamp of the event [ms].
-        locks: Bits of the locks that were on.
+        locks: Sum of the bits of the locks, such as Caps Lock, that were on.
         due_s: Time of `time.monotonic` from which the key counts as released [s].
     """
 

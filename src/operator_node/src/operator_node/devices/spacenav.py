@@ -137,7 +137,7 @@ class Spacenav(Device):
     # --- The connection.
 
     def _negotiate(self) -> int:
-        """Requests version 1 of the protocol, and returns the version in use. It is 0 if the daemon does not answer."""
+        """Requests version 1 of the protocol. Returns the version in use, or 0 if the daemon does not answer."""
         self._send(WORD.pack(PROTOCOL_TAG | 1))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while len(self._received) < WORD.size:

@@ -158,7 +158,7 @@ class BadNetwork:
         seed: Seed of the random numbers.
 
     Attributes:
-        done: Number of datagrams, keyed by fault, or by `sent` without a fault.
+        done: Number of datagrams, keyed by fault; the key `sent` counts datagrams without a fault.
     """
 
     def __init__(
@@ -195,7 +195,7 @@ class BadNetwork:
 
 
 def stream(suits: Sequence[Suit], hz: float, first_sample: int = 0) -> Iterator[tuple[float, list[bytes]]]:
-    """Yields time [s] and datagrams of each sample of all suits, without end."""
+    """Yields, for each sample, the time [s] and the datagrams of all suits. Never ends."""
     number = 0
     while True:
         time_s = number / hz

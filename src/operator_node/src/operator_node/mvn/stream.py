@@ -56,7 +56,7 @@ class StreamDecoder:
 
     Args:
         position_scale: Factor that converts positions of types 02 and 24 to metres.
-        y_up: Whether MVN sends these types with the y axis up; otherwise z is up. Type 01 always has y up, and
+        y_up: Whether MVN sends types 02 and 24 with the y axis up; otherwise z is up. Type 01 always has y up, and
             positions in centimetres.
         max_people: Largest number of people. Messages of further people are refused.
 

@@ -109,7 +109,7 @@ class BagFile:
         return sum(each.size for each in self.chunks)
 
     def clock_of(self, connections: Collection[int]) -> ClockStep:
-        """Returns the largest backward step of the recording times of given connections, in the order of the file."""
+        """Returns the largest backward step between recording times of given connections, in the order of the file."""
         index = self._index_of(connections)
         index = index[np.lexsort((index["offset"], index["chunk"]))]
         return set_back(index["time_ns"] / 1e9)

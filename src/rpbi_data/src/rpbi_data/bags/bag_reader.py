@@ -54,7 +54,7 @@ class BagReader:
         types: Set of message types, indexed by topic and sorted by topic; nearly always one type per topic.
         md5sums: MD5 sums of the message types, indexed by topic.
         counts: Number of messages, indexed by topic.
-        budget: Limits of processor time and table cells.
+        budget: Limits of the processor time and of the number of table cells.
 
     Raises:
         BagError: If the file does not exist, is not a complete bag, or exceeds a limit.
@@ -110,7 +110,7 @@ class BagReader:
             yield BagMessage(topic, message_type, raw, record_time_ns)
 
     def clock_of(self, topic: str) -> ClockStep:
-        """Returns the largest backward step of a topic's recording times, in the order of the file."""
+        """Returns the largest backward step between a topic's recording times, read in the order of the file."""
         return self._bag.clock_of([number for number, each in self._types.items() if each[0] == topic])
 
     def _open(self) -> BagFile:

@@ -95,7 +95,7 @@ def _topics_sent(uri: str, node: str) -> set[str]:
 
 
 def _count_sent_by(uri: str, node: str) -> dict[str, int]:
-    """Returns how many messages the node at `uri` has sent to `node`, indexed by topic; empty if it does not answer."""
+    """Returns how many messages the node at `uri` has sent to `node`, indexed by topic; empty without an answer."""
     other_end = _node(uri)
     try:
         connections = other_end.getBusInfo(_CALLER)[2]

@@ -31,7 +31,7 @@ class _Encoding(NamedTuple):
 
     Attributes:
         dtype: NumPy type of a channel.
-        channels: Positions in the message of the returned channels: red, green, blue (and alpha), or a single channel.
+        channels: Index within a pixel of each returned channel: red, green, blue (and alpha), or a single channel.
     """
 
     dtype: str

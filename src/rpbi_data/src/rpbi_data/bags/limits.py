@@ -72,7 +72,7 @@ class Budget:
         path: The bag, for error messages.
         file_bytes: Size of the bag's file [bytes].
         unlimited: Whether to disable the limits.
-        clock: Returns the processor time of this thread [s].
+        clock: Function that returns the processor time of this thread [s].
     """
 
     def __init__(

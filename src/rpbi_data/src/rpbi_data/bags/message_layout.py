@@ -202,7 +202,7 @@ class Layout(NamedTuple):
     Attributes:
         leaves: Location of each value, indexed by path, such as `pose/position/x` or `data/3`.
         counts: Number of elements of each array, indexed by path.
-        fixed: Spans of bytes that contain lengths. The layout is valid for all messages with equal bytes there.
+        fixed: Spans of bytes that contain lengths. The layout is valid for all messages with the same bytes there.
     """
 
     leaves: dict[str, Leaf]

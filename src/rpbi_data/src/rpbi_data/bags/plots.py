@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_LINES = 20
-"""Largest number of lines of a panel that has a legend; panels with more lines have none."""
+"""Largest number of lines of a panel that has a legend; panels with more lines have no legend."""
 MAX_POINTS = 20_000
-"""Largest number of points of a line; of longer lines, every k-th point is drawn."""
+"""Largest number of drawn points of a line; if a line has more points, only every k-th point is drawn."""
 _AXES = "xyz"
 _QUANTITIES = {
     "position": "position [rad or m]",

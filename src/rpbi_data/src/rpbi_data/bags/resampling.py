@@ -27,7 +27,8 @@ class Aligned(NamedTuple):
 
     Attributes:
         table: Columns `NAME/COLUMN` of all tables; the index is `time` [s].
-        max_time_error_s: Largest time error of each table [s], indexed by name; NaN if no row of the table has a value.
+        max_time_error_s: Largest `time_error` (see `resample`) of each table [s], indexed by table name; NaN if no row
+            of the table has a value.
     """
 
     table: pd.DataFrame
@@ -149,7 +150,7 @@ def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
 
 
 def _snapped(times: Array, known: Array, resolution: int) -> Array:
-    """Rounds times that differ by at most `resolution` from a known time to the known time [ns]."""
+    """Replaces each time that differs from a known time by at most `resolution` [ns] by this known time."""
     if not len(known):
         return times
     newest = known[np.searchsorted(known, times + resolution, side="right") - 1]

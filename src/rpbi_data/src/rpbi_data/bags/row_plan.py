@@ -19,8 +19,8 @@ class RowPlan(NamedTuple):
     """Mapping from messages with one layout to table rows.
 
     Attributes:
-        rows: For each row that a message becomes, the columns of the row. The column `STAMP` is the stamp of the row.
-        fixed: Spans of bytes. The plan is valid for all messages with equal bytes in these spans.
+        rows: Rows into which a message is converted, each as its columns. The column `STAMP` is the stamp of the row.
+        fixed: Spans of bytes. The plan is valid for all messages with the same bytes in these spans.
         notes: Log messages about content that is not in the table.
     """
 

@@ -41,7 +41,7 @@ class _Block(NamedTuple):
     """Messages with the same layout.
 
     Attributes:
-        rows: For each row that a message becomes, the columns of the row.
+        rows: Rows into which a message is converted, each as its columns.
         matrix: The n serialised messages, shape (n, size), uint8.
         indices: Indices of these messages in the batch, ascending, shape (n,).
     """
@@ -230,7 +230,7 @@ class TableBuilder:
 
 
 def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
-    """Reads the same value from each of n messages with the same layout, shape (n, size), uint8.
+    """Reads the value at one location from each of n messages with the same layout, shape (n, size), uint8.
 
     Returns:
         Values of the shape (n,): numbers of the field's type, bool, float64 [s] for `time` and `duration`, `str`, or
@@ -257,7 +257,7 @@ def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
 
 
 def _read_stamps(leaf: Leaf, matrix: Array) -> Array:
-    """Reads the same `time` from each of n messages with the same layout; returns int64, shape (n,) [ns]."""
+    """Reads the `time` at one location from each of n messages with the same layout; returns int64, shape (n,) [ns]."""
     start, stop = leaf.span
     seconds, nanoseconds = np.ascontiguousarray(matrix[:, start:stop]).view("<u4").astype(np.int64).T
     return np.asarray(seconds * PER_SECOND + nanoseconds)

@@ -27,7 +27,7 @@ class TopicReport(pd.DataFrame):
 def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
     """Measures number, size and rate of the messages of every topic in a bag.
 
-    The time of a message is the stamp of its header, or the recording time if it has no stamp, as on `/tf`.
+    The time of a message is the stamp of its header, or the recording time if the message has no stamp, as on `/tf`.
 
     Args:
         path: A `.bag` file with any compression.

@@ -53,8 +53,8 @@ def transforms_between(
         parent: Reference frame of the poses, without a leading slash. It need not be above `child` in the tree.
         child: Frame whose poses are returned, without a leading slash.
         times: Times of the rows, ascending, shape (n,) [s]. By default, all times of the transforms between the frames.
-        max_time_error_s: Largest time between a row and the nearest sample of each transform [s]. Rows that exceed it
-            are left out.
+        max_time_error_s: Largest time between a row and the nearest sample of each transform [s]. Rows with a larger
+            time error are left out.
 
     Returns:
         A table with the columns `translation/x` ... `translation/z` [m], `rotation/x` ... `rotation/w`, and

@@ -30,13 +30,13 @@ def replay(
 ) -> int:
     """Simulates a recorded session again, and compares the states with the recorded states.
 
-    The exit code is 1 if a state differs or a part cannot be simulated. No ROS master is needed.
+    The exit code is 1 if a state differs or a part of the recording cannot be simulated. No ROS master is needed.
 
     Args:
         bag: the recording; default: out/demo/recording.bag, which `./rpbi demo` records
         ns: namespace of the recorded simulator; default: /
         quiet: shows no progress bar
-        trust: Python packages from which classes that the bag names may be imported, such as object types
+        trust: Python packages from which classes named in the bag may be imported, such as object types
         max_ticks: refuses recordings of more than N ticks; default: 20,000,000, which is 5.5 hours at 1 kHz
         any_size: also reads a bag whose unpacked size exceeds both 1 GiB and 255 times its file size
         jobs: number of processes, which simulate the parts between keyframes at the same time; default: 1

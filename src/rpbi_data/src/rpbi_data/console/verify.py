@@ -32,7 +32,7 @@ def verify(
     Args:
         folder: the folder of the episodes
         jobs: number of processes, each of which simulates one episode at a time; default: 1
-        trust: Python packages from which classes that episodes name may be imported, such as object types
+        trust: Python packages from which classes named in episodes may be imported, such as object types
         max_ticks: refuses episodes of more than N ticks; default: 20,000,000, which is 5.5 hours at 1 kHz
         max_cpu: stops simulating an episode after this processor time [s]; default: 3,600
         any_size: also reads bags whose unpacked size exceeds both 1 GiB and 255 times their file size

@@ -38,7 +38,7 @@ def view(
         N: number of the episode in the folder; not allowed with a bag
         out: the HTML file; default: episode_N.html, or BAG.html for BAG.bag, in the current folder
         ns: namespace of the recorded simulator, for a bag; default: /
-        trust: Python packages from which classes that the recording names may be imported, such as object types
+        trust: Python packages from which classes named in the recording may be imported, such as object types
         max_cpu: stops after this processor time [s]; default: 600
         any_size: also reads a bag whose unpacked size exceeds both 1 GiB and 255 times its file size
     """

@@ -32,7 +32,7 @@ ANY_SIZE = "--any-size, if you know who made it"
 
 
 class Tree(NamedTuple):
-    """Result of `look_at`.
+    """Result of checking the files and folders of a data set with `look_at`.
 
     Attributes:
         faults: Messages about links, pipes, sockets and devices, and about too many files or too deeply nested folders.

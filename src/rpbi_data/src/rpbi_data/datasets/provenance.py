@@ -82,7 +82,7 @@ def _link(before: str, state: Mapping[str, Any]) -> str:
 
 
 def checksums(values: Array) -> list[list[int]]:
-    """Returns three CRC-32 checksums of each column: of all rows, of all but the last, and of all but the first row.
+    """Returns CRC-32 checksums of each column: of all rows, of all rows but the last, and of all rows but the first.
 
     Args:
         values: Values of a feature, shape (n, columns).

@@ -73,7 +73,7 @@ class Signal(NamedTuple):
 
     @property
     def begins_at_once(self) -> bool:
-        """Whether rows start only when this feature has a message; False for actions."""
+        """Whether no row may precede this feature's first message; False for actions."""
         return self.method not in (NEXT, PREVIOUS)
 
 

@@ -96,7 +96,7 @@ class SourceEpisode(ExportedEpisode):
         return sum(int(table.memory_usage().sum()) for table in tables.values())
 
     def release(self) -> None:
-        """Releases the memory of the tables. The next use reads them again."""
+        """Releases the memory of the tables. The tables are read again when they are next used."""
         for name in ("_recorded", "_tables", "times"):
             self.__dict__.pop(name, None)
 
@@ -329,7 +329,7 @@ class SourceEpisode(ExportedEpisode):
         return image_topics(self._types, self._row_options)
 
     def _images(self, topic: str) -> Iterator[tuple[Callable[[], Array], int]]:
-        """Yields a function that decodes the pixels, and the stamp [ns], for each image in the order of stamps."""
+        """Yields two values per image, ordered by stamp: a function that returns the pixels, and the stamp [ns]."""
         waiting: list[tuple[int, int, BagMessage]] = []
         with BagReader(self.bag, any_size=self._any_size) as bag:
             latest = 0
@@ -388,7 +388,7 @@ def _rgb(pixels: Array) -> Array:
 
 
 def _make_continuous(values: Array, feature: Feature) -> None:
-    """Flips signs of quaternions in place: each becomes nearest to the previous one, and the first gets w >= 0."""
+    """Flips signs of quaternions in place, so that each is nearest to the previous one and the first has w >= 0."""
     names = feature.names
     for first in range(len(names) - 3):
         if names[first : first + 4] == QUATERNION:

@@ -33,7 +33,7 @@ def statistics(values: Array) -> dict[str, list[Any]]:
 
 
 class ImageStatistics:
-    """Computes statistics of an episode's images: of each colour channel, in a sample of images and pixels.
+    """Computes statistics of each colour channel of an episode's images, from a sample of the images and pixels.
 
     Args:
         frames: Expected number of images.

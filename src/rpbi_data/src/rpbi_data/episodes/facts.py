@@ -61,7 +61,7 @@ class TopicFacts(ConfigModel):
 
 
 class FileFacts(ConfigModel):
-    """Data on a file that the world names, as returned by `rpbi_data.episodes.files.store_files`."""
+    """Data on a file named in the world's description, as returned by `rpbi_data.episodes.files.store_files`."""
 
     path: Path
     sha256: Digest

@@ -1,4 +1,4 @@
-"""Stores copies of the files that a world names, and changes the world's description to use these copies."""
+"""Stores copies of the files named in a world's description, and changes the description to use these copies."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def store_files(
     Args:
         description: The world's description as JSON, as on the topic `rpbi/world_description`.
         store: The folder. The name of a copy is `HASH.EXTENSION`. Existing copies are kept.
-        is_own: Function of a file's path, with symbolic links resolved, that returns whether the file may be copied;
-            see `files_of_world`.
+        is_own: Function that returns whether a file may be copied, see `files_of_world`. The argument is the file's
+            path, with symbolic links resolved.
 
     Returns:
         A dictionary for each file, and messages. A dictionary has the keys `path` and `sha256`, and for a URDF also
@@ -74,9 +74,9 @@ def store_files(
 def files_of_world(description: str, further: Iterable[Path] = ()) -> Callable[[Path], bool]:
     """Returns a function that decides whether a file may belong to a world with an untrusted description.
 
-    Allowed are files in ROS packages, in installed robot data, in the folder of the world's main file, and in further
-    folders. The folder of the main file is only included if the file has the keys of a main file. Hidden files and
-    files in hidden folders are only allowed in further folders.
+    The function allows files in ROS packages, in installed robot data, in the folder of the world's main file, and in
+    further folders. The folder of the main file is only included if the file has the keys of a main file. Hidden files
+    and files in hidden folders are only allowed in further folders.
 
     Args:
         description: The world's description as JSON.

@@ -61,7 +61,7 @@ class Episode:
         seeds: Text about random seeds, from the recorder's parameter `seeds` or from the farm.
         versions: Versions of this workspace, PyBullet, Python and numpy, indexed by name.
         git: Commit of the workspace, followed by ` changed` if files differ from the commit; empty if unknown.
-        files: Files that the world names, see `rpbi_data.episodes.files`.
+        files: Files named in the world's description, see `rpbi_data.episodes.files`.
         published: Number of messages that publishers sent to the recorder, indexed by topic.
         topics: Properties of the topics in the bag, indexed by topic; see `rpbi_data.episodes.bags.measure_topics`.
     """
@@ -344,7 +344,7 @@ def hold(part: Path, wait_s: float = 0.0) -> int:
 
 
 def is_held(part: Path) -> bool:
-    """Returns whether a process holds the lock of a temporary folder, which means that it records the episode."""
+    """Returns whether a process holds the lock of a temporary folder, usually because it records the episode."""
     try:
         os.close(hold(part))
     except BlockingIOError:

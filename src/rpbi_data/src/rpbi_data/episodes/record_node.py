@@ -171,7 +171,7 @@ class RecordNode:
         self._publish_status()
 
     def start(self) -> str:
-        """Starts an episode, and returns a message for the user; raises an InterfaceError if it cannot be started."""
+        """Starts an episode, and returns a message for the user; raises an InterfaceError if starting fails."""
         with self._lock:
             if self._recorder is not None:
                 raise EpisodeError(self._folder.path, f"episode {self._episode.number} is being recorded")
@@ -185,7 +185,7 @@ class RecordNode:
             return f"episode {self._episode.number} is being recorded: {len(topics)} topics"
 
     def stop(self) -> str:
-        """Ends the current episode, and returns a message for the user; raises an InterfaceError if there is none."""
+        """Ends the current episode, and returns a message for the user; raises an InterfaceError without an episode."""
         with self._lock:
             self._require_recording()
             self._simulator.wait_for_hash()
@@ -359,7 +359,7 @@ class RecordNode:
     def _actions(
         self, start: _Trigger | None, discard: _Trigger | None, labels: Mapping[_Trigger, str]
     ) -> dict[_Trigger, Callable[[], None]]:
-        """Returns the actions, indexed by key or button. Actions whose key or button is None are left out."""
+        """Returns the function to call for each key or button. Functions whose key or button is None are left out."""
         actions = [(start, self._toggle), (discard, self.discard)]
         actions += [(each, partial(self.label, label)) for each, label in labels.items()]
         return {each: partial(_do, action) for each, action in actions if each is not None}

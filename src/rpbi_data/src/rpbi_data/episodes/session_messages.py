@@ -53,7 +53,7 @@ def read_recording(
         any_size: Whether the bag may exceed the limits of `BagReader`.
         earlier: Bag with `rpbi/commands` from before the recording; None if there is no such bag.
         relocate: Function that returns the world's description with other file names.
-        names: New names of the files that keyframes name, indexed by recorded name.
+        names: New paths of the files named in keyframes, indexed by recorded path.
         needs_states: Whether the bag must contain state hashes to compare, as for a replay.
 
     Raises:
@@ -175,7 +175,7 @@ def _add_commands(message: WorldCommands, commands: _Commands) -> None:
 
 
 def _check(bag: BagReader, topics: dict[str, Any], prefix: str, needs_states: bool) -> None:
-    """Raises a BagError if the bag lacks a required topic, or a message definition differs from this version's."""
+    """Raises a BagError if the bag lacks a required topic, or a message definition differs from the installed one."""
     needed = [f"{prefix}rpbi/world_description", *([f"{prefix}rpbi/state"] if needs_states else ())]
     missing = [topic for topic in needed if not bag.counts.get(topic)]
     if missing:

@@ -76,7 +76,7 @@ def verify_all(
         folder: The folder of episodes.
         numbers: Numbers of the episodes.
         jobs: Largest number of simultaneous processes.
-        trust: Python packages from which classes that episodes name may be imported.
+        trust: Python packages from which classes named in episodes may be imported.
         limits: Limits on each episode.
     """
     each = max(1, jobs // max(1, len(numbers)))  # processes per episode, for episodes with keyframes

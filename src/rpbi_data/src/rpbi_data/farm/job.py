@@ -1,4 +1,4 @@
-"""The job of a farm, which determines the content of its episodes, and the outcome of an episode."""
+"""Defines `FarmJob`, which determines the content of a farm's episodes, and `EpisodeOutcome`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CHANGED = {"world_sha256": "the world, or a file that it names", "policy_sha256
 
 @dataclass(frozen=True)
 class FarmJob:
-    """All inputs on which the episodes of a farm depend.
+    """World, policy, seed and options, which together determine the episodes of a farm.
 
     Attributes:
         world: The main YAML file.

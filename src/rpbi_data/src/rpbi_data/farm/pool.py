@@ -111,7 +111,7 @@ class Pool:
 
     Args:
         folder: Folder of the episodes.
-        new_child: Function that starts a process.
+        new_child: Function that starts a process and returns its `Child`.
         size: Maximum number of processes.
         is_replaced: Whether a process that dies is replaced; otherwise, `run` ends with an error.
     """

@@ -108,9 +108,10 @@ class Arrangement:
         )
 
     def view(self, random: np.random.Generator, intrinsics: Intrinsics) -> Pose:
-        """Returns a random pose of the camera's optical frame in the world, above the area and directed at its middle.
+        """Returns a random pose of the camera's optical frame in the world frame.
 
-        No robot is within `CLEAR_M` of the camera, or between the camera and the point that the camera looks at.
+        The camera is above the area, and looks at a random point near the middle of the area. No robot is within
+        `CLEAR_M` of the camera, or between the camera and this point.
 
         Raises:
             InterfaceError: If robots obstruct all of `MAX_VIEWS` views.

@@ -26,7 +26,7 @@ def attach(
     Args:
         CHILD, PARENT: objects, or links written as OBJECT/LINK
         name: name of the attachment, as used by `detach`; default: name of the child object
-        ball: hold only the position; the child may rotate freely
+        ball: holds only the position; the child may rotate freely
         max_force: force above which the attachment breaks [N]; without this option, it never breaks
         ns: namespace of the simulator; default: ROS_NAMESPACE
     """

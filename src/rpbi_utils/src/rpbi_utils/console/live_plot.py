@@ -19,8 +19,8 @@ def live_plot(
         ./rpbi live_plot /rpbi/kuka_lwr/joint_states/position          # all joints
 
     Args:
-        TOPIC/FIELD: a numeric field, or an array or part of the message to plot all its numbers; an array element is
-            selected by its index or joint name. The topic may appear later.
+        TOPIC/FIELD: a numeric field, or an array or part of the message, all of whose numbers are plotted; an array
+            element is selected by its index or joint name. The topic may appear later.
         seconds: length of the visible time span [s], 0.5 to 120; default: 10
         out: folder for saved pictures and data; default: the current folder
 

@@ -24,7 +24,7 @@ def move(
     stop: Annotated[bool, Argument("", excludes="instead")] = False,
     ns: Namespace = None,
 ) -> str:
-    """Moves joints or a link of a robot in a given time, or teleports another object to a pose.
+    """Moves joints or a link of a robot in a given time, or teleports an object to a pose.
 
     The command waits for the end of the motion and prints the remaining error. The exit code is 1 if the robot did not
     reach the goal. Ctrl-C ends the command, but the robot keeps moving.

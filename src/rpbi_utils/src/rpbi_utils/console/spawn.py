@@ -89,8 +89,8 @@ def spawn(
 def kind_in(data: Mapping[str, Any]) -> str:
     """Returns the object type, or `camera`, whose configuration model fits the keys of YAML data best.
 
-    Models are ranked by these criteria, the first being the most important: all required keys are present; the largest
-    number of given keys is known; the most keys are required; the fewest keys in total.
+    Models are compared by these criteria, in this order: whether all required keys are given, how many given keys the
+    model knows, how many keys the model requires, and how few keys the model has in total.
     """
     from rpbi.bodies import BODY_TYPES
     from rpbi.config.sensors import RgbdSensorConfig

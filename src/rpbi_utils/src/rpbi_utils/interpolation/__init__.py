@@ -1,6 +1,7 @@
 """Smooth motions through waypoints; `Interpolator` is the core of `interpolation_node.py`.
 
-The exported functions and the class `TCubicHermiteSpline` have the names and arguments of the authors' release.
+The exported functions and the class `TCubicHermiteSpline` have the names and arguments of this project's original
+release.
 """
 
 from .release import TCubicHermiteSpline as TCubicHermiteSpline

@@ -1,4 +1,4 @@
-"""Computes a motion's peak speeds and accelerations, and the factor of slowing down that makes it keep its limits."""
+"""Computes a motion's peak speeds and accelerations, and how much it must be slowed down to keep its limits."""
 
 from __future__ import annotations
 

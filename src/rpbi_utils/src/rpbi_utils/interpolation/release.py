@@ -1,4 +1,4 @@
-"""Interpolates series of points. The functions have the names and arguments of the authors' release.
+"""Interpolates series of points. The functions have the names and arguments of this project's original release.
 
 The functions `interpolate_...` return sample times [s] and samples. Samples are `1/sample_freq` [s] apart, starting at
 the first time in `time_seq`, which need not be 0. The last sample is at the last time in `time_seq`; the step before

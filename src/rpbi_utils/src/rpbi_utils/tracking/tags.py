@@ -1,4 +1,4 @@
-"""Detects AprilTags (family tag36h11) in images with OpenCV, and writes them as textured meshes for a world."""
+"""Detects AprilTags (family tag36h11) in images with OpenCV, and writes textured meshes of tags for a world."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ class LeRobot(DatasetFormat):
         _json(meta / "info.json", info)
 
     def _write_videos(self, index: int, episode: ExportedEpisode) -> tuple[dict[str, _Film], dict[str, Array]]:
-        """Writes the videos of an episode. Returns data on each camera's video, and the values of all features."""
+        """Writes the videos of an episode. Returns a `_Film` per camera and the features' values, indexed by key."""
         paths = {each.key: self._folder / video_file(each.key, index) for each in self._schema.cameras}
         with ExitStack() as undo:
             for path in paths.values():

@@ -75,7 +75,7 @@ class EpisodeBag:
         self._write_images()
 
     def before_step(self) -> None:
-        """Writes the commands since the last call.
+        """Writes the commands that the world has recorded since the last call.
 
         Targets are also written to the topics on which the simulator's node would receive them.
 
