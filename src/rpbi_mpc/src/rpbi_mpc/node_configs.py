@@ -120,4 +120,4 @@ def _any_sampler() -> Schema:
         {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}
         for name, schema in SAMPLERS.schemas().items()
     ]
-    return {"description": "How candidates are drawn and chosen.", "anyOf": [*known, own_type]}
+    return {"description": "Sampler, which draws candidates and computes the plan from their costs.", "anyOf": [*known, own_type]}

@@ -27,7 +27,7 @@ class BodyConfig(ConfigModel):
     """Keys of all objects."""
 
     name: Name = Field(description="Unique name; topics and TF frames are named after it.")
-    sensors: ListOf[SensorEntry] = Field((), description="Sensors of your own that it carries.")
+    sensors: ListOf[SensorEntry] = Field((), description="Sensors of your own on the body.")
 
     @model_validator(mode="after")
     def _sensors_differ_in_name(self) -> Self:

@@ -16,15 +16,28 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 class CollisionObjectConfig(BodyConfig):
     """A collision object, which has contacts, and follows a TF frame or stays in place."""
 
-    createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
-    createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")
-    changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
-    basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
-    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
+    createVisualShape: CreateVisualShape = Field(description="Visual shape of the object.")
+    createCollisionShape: CreateCollisionShape = Field(description="Collision shape of the object.")
+    changeDynamics: ChangeDynamics | None = Field(
+        None, description="Friction, restitution and other dynamics parameters. By default, PyBullet's values."
+    )
+    basePosition: Position = Field(
+        (0.0, 0.0, 0.0), description="Position in the world; with `object_tf`, until the first pose arrives from TF."
+    )
+    baseOrientation: Quat = Field(
+        (0.0, 0.0, 0.0, 1.0),
+        description="Orientation in the world, x, y, z, w; with `object_tf`, until the first pose arrives from TF.",
+    )
     useMaximalCoordinates: MaximalCoordinates = False
     convexDecomposition: Decomposition = None
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, the object stays in place.")
-    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+    object_tf: ObjectTf | None = Field(
+        None, description="TF frame that the object follows. By default, the object stays in place."
+    )
+    contacts: ContactsConfig | None = Field(
+        None,
+        description="Topics with the contacts of the object; `{}` selects the defaults. By default, contacts are not "
+        "published.",
+    )
 
 
 class CollisionObject(ShapeObject):

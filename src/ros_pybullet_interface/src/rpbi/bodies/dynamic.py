@@ -25,21 +25,31 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 class DynamicObjectConfig(BodyConfig):
     """A dynamic object, which physics moves."""
 
-    createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
-    createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")
-    changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
-    baseMass: PositiveKilograms = Field(description="Mass.")
-    basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
-    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
+    createVisualShape: CreateVisualShape = Field(description="Visual shape of the object.")
+    createCollisionShape: CreateCollisionShape = Field(description="Collision shape of the object.")
+    changeDynamics: ChangeDynamics | None = Field(
+        None, description="Friction, restitution and other dynamics parameters. By default, PyBullet's values."
+    )
+    baseMass: PositiveKilograms = Field(description="Mass of the object.")
+    basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position in the world.")
+    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation in the world, x, y, z, w.")
     useMaximalCoordinates: MaximalCoordinates = False
     convexDecomposition: Decomposition = None
-    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
-    tracked_tf: ObjectTf | None = Field(
-        None, description="TF frame to follow while it is up to date; otherwise physics moves the object."
+    resetBaseVelocity: ResetBaseVelocity | None = Field(
+        None, description="Start velocity. By default, the object starts at rest."
     )
-    broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
-    base_state_hz: HzOrOff = Field(0.0, description="Rate of its pose and velocity on `base_state`; 0 is off.")
-    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+    tracked_tf: ObjectTf | None = Field(
+        None,
+        description="TF frame that the object follows while the frame is up to date; otherwise physics moves the "
+        "object. By default, physics always moves the object.",
+    )
+    broadcast_hz: HzOrOff = Field(0.0, description="Rate of the object's pose on TF; 0 is off.")
+    base_state_hz: HzOrOff = Field(0.0, description="Rate of the object's pose and velocity on `base_state`; 0 is off.")
+    contacts: ContactsConfig | None = Field(
+        None,
+        description="Topics with the contacts of the object; `{}` selects the defaults. By default, contacts are not "
+        "published.",
+    )
 
 
 class DynamicObject(ShapeObject):

@@ -15,8 +15,8 @@ from .body import Body
 MaximalCoordinates = Annotated[
     Switch,
     Field(
-        description="Whether the solver of rigid bodies moves it; between two such objects friction is the same in all "
-        "directions, see docs/physics.md."
+        description="Whether PyBullet's solver of rigid bodies moves the object. Between two such objects, friction "
+        "is the same in all directions; see docs/physics.md."
     ),
 ]
 
@@ -25,12 +25,16 @@ class ConvexDecomposition(PybulletModel):
     """Parameters of V-HACD, which divides a concave mesh into convex parts; each part collides as its convex hull."""
 
     resolution: Annotated[int, Field(ge=10_000, le=64_000_000)] = Field(
-        100_000, description="Voxels that the mesh is filled with: more take longer, and show finer parts."
+        100_000,
+        description="Number of voxels that represent the mesh. A larger number preserves finer details but takes "
+        "longer.",
     )
-    concavity: Fraction = Field(0.0025, description="Share of concavity that a part may keep; less makes more parts.")
-    maxNumVerticesPerCH: Annotated[int, Field(ge=4, le=1024)] = Field(64, description="Corners of a part, at most.")
+    concavity: Fraction = Field(0.0025, description="Largest concavity of a part; a smaller value makes more parts.")
+    maxNumVerticesPerCH: Annotated[int, Field(ge=4, le=1024)] = Field(
+        64, description="Largest number of vertices of a part."
+    )
     minVolumePerCH: Annotated[float, Field(ge=0.0, le=0.01)] = Field(
-        0.0001, description="Volume of a part, at least, as a share of the mesh's."
+        0.0001, description="Least volume of a part, as a fraction of the mesh's volume."
     )
 
 
@@ -43,7 +47,10 @@ Decomposition = Annotated[
     BeforeValidator(_of_a_switch),
     AlsoTakes({"type": "boolean"}),
     Expects("true, false or a mapping"),
-    Field(description="Whether its mesh collides as convex parts, not as one hull: true, or parameters of V-HACD."),
+    Field(
+        description="Whether the mesh collides as several convex parts instead of one convex hull: true, or "
+        "parameters of V-HACD."
+    ),
 ]
 
 

@@ -31,14 +31,22 @@ from .dynamics import link_index
 class SoftObjectConfig(BodyConfig):
     """A soft body, which deforms."""
 
-    loadSoftBody: LoadSoftBody | None = Field(None, description="Its mesh and what it is made of; this or loadURDF.")
-    loadURDF: LoadURDF | None = Field(None, description="A URDF with a `<deformable>`; this or loadSoftBody.")
-    createSoftBodyAnchor: ListOf[AnchorEntry] = Field(
-        (), description="Corners tied to bodies or the world, each [node, body, link, position]."
+    loadSoftBody: LoadSoftBody | None = Field(
+        None, description="Mesh, start pose and material of the body. Either this key or `loadURDF` is required."
     )
-    changeVisualShape: ChangeVisualShape | None = Field(None, description="Its colour.")
-    surface_hz: HzOrOff = Field(20.0, description="Rate of its surface for RViz; 0 is off.")
-    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+    loadURDF: LoadURDF | None = Field(
+        None, description="URDF file with a `<deformable>` element. Either this key or `loadSoftBody` is required."
+    )
+    createSoftBodyAnchor: ListOf[AnchorEntry] = Field(
+        (), description="Mesh vertices that are tied to bodies or to the world, each as [node, body, link, position]."
+    )
+    changeVisualShape: ChangeVisualShape | None = Field(None, description="Colours of the body.")
+    surface_hz: HzOrOff = Field(20.0, description="Rate of the surface markers for RViz; 0 is off.")
+    contacts: ContactsConfig | None = Field(
+        None,
+        description="Topics with the contacts of the body; `{}` selects the defaults. By default, contacts are not "
+        "published.",
+    )
 
     @model_validator(mode="after")
     def _comes_from_one_place(self) -> SoftObjectConfig:

@@ -23,17 +23,27 @@ from .body_config import BodyConfig
 class UrdfObjectConfig(BodyConfig):
     """An object that comes from a URDF and has no motors."""
 
-    loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    loadURDF: LoadURDF = Field(description="URDF file of the object, and pose of its base.")
     inertia_from_urdf: Switch = Field(
-        True, description="Whether moments of inertia are the URDF's, else PyBullet's guess from the collision shapes."
+        True,
+        description="Whether moments of inertia are taken from the URDF, otherwise computed by PyBullet from the "
+        "collision shapes.",
     )
-    object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed base follows.")
-    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
-    broadcast_hz: HzOrOff = Field(0.0, description="Rate of its links' poses on TF; 0 is off.")
+    object_tf: ObjectTf | None = Field(
+        None, description="TF frame that a fixed base follows. By default, the base does not follow a frame."
+    )
+    resetBaseVelocity: ResetBaseVelocity | None = Field(
+        None, description="Start velocity of a base that is not fixed. By default, the base starts at rest."
+    )
+    broadcast_hz: HzOrOff = Field(0.0, description="Rate of the poses of all links on TF; 0 is off.")
     base_state_hz: HzOrOff = Field(
-        0.0, description="Rate of its root link's pose and velocity on `base_state`; 0 is off."
+        0.0, description="Rate of the root link's pose and velocity on `base_state`; 0 is off."
     )
-    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+    contacts: ContactsConfig | None = Field(
+        None,
+        description="Topics with the contacts of the object; `{}` selects the defaults. By default, contacts are not "
+        "published.",
+    )
 
 
 class UrdfObject(Body):

@@ -13,13 +13,22 @@ from .shape_object import ShapeObject
 class VisualObjectConfig(BodyConfig):
     """A visual object, which is visible but has no contacts."""
 
-    createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
+    createVisualShape: CreateVisualShape = Field(description="Visual shape of the object.")
     createCollisionShape: CreateCollisionShape | None = Field(
-        None, description="Accepted and ignored, so that a collision object can be turned into a visual one."
+        None,
+        description="Accepted without effect, so that the file of a collision object can also be used for a visual "
+        "object.",
     )
-    basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
-    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, the object stays in place.")
+    basePosition: Position = Field(
+        (0.0, 0.0, 0.0), description="Position in the world; with `object_tf`, until the first pose arrives from TF."
+    )
+    baseOrientation: Quat = Field(
+        (0.0, 0.0, 0.0, 1.0),
+        description="Orientation in the world, x, y, z, w; with `object_tf`, until the first pose arrives from TF.",
+    )
+    object_tf: ObjectTf | None = Field(
+        None, description="TF frame that the object follows. By default, the object stays in place."
+    )
 
 
 class VisualObject(ShapeObject):

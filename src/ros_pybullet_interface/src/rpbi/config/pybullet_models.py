@@ -77,26 +77,32 @@ class PybulletModel(ConfigModel):
 class LoadURDF(PybulletModel):
     """URDF file of a body, and the initial pose of the body."""
 
-    fileName: RobotFile = Field(description="URDF file, or the word `robot_description` for the parameter.")
-    basePosition: Position | None = optional("Position of the base in the world.")
-    baseOrientation: Quat | None = optional("Orientation of the base in the world as x, y, z, w.")
-    useFixedBase: Switch | None = optional("Whether the base is fixed to the world.")
-    useMaximalCoordinates: Switch | None = optional("Whether joints are solved as constraints.")
-    flags: Annotated[int, URDF_FLAGS] | None = optional("URDF_... flags.")
-    globalScaling: Positive | None = optional("Factor on all lengths.")
+    fileName: RobotFile = Field(
+        description="URDF file, or the word `robot_description` for the URDF in the parameter of this name."
+    )
+    basePosition: Position | None = optional("Position of the base in the world. By default, the origin.")
+    baseOrientation: Quat | None = optional(
+        "Orientation of the base in the world, x, y, z, w. By default, that of the world."
+    )
+    useFixedBase: Switch | None = optional("Whether the base is fixed to the world. By default, it is not.")
+    useMaximalCoordinates: Switch | None = optional(
+        "Whether each link is a separate rigid body, with joints as constraints."
+    )
+    flags: Annotated[int, URDF_FLAGS] | None = optional("One or more URDF_... constants.")
+    globalScaling: Positive | None = optional("Scale factor of the whole body.")
 
 
 class _CreateShape(PybulletModel):
     """Keys of both visual and collision shapes."""
 
-    shapeType: Annotated[int, SHAPE_TYPES] = Field(description="GEOM_... constant.")
+    shapeType: Annotated[int, SHAPE_TYPES] = Field(description="Type of the shape, a GEOM_... constant.")
     radius: PositiveMetres | None = optional("Radius of a sphere, capsule or cylinder.")
     halfExtents: HalfExtents | None = optional("Half the edge lengths of a box.")
-    fileName: ExistingFile | None = optional("Mesh file; of a shape to feel, also the file of a height field.")
-    meshScale: Vec3 | None = optional("Factors on a mesh along x, y and z.")
+    fileName: ExistingFile | None = optional("Mesh file; in a collision shape, also the file of a height field.")
+    meshScale: Vec3 | None = optional("Scale factors of a mesh along x, y and z.")
     planeNormal: Direction | None = optional("Normal of a plane.")
-    vertices: ListOf[Position] | None = optional("Corners of a mesh that has no file.")
-    indices: ListOf[Count] | None = optional("Corner numbers of its triangles.")
+    vertices: ListOf[Position] | None = optional("Vertices of a mesh without a file.")
+    indices: ListOf[Count] | None = optional("Vertex indices of the mesh's triangles.")
 
     @model_validator(mode="after")
     def _mesh_has_a_source(self) -> Self:
@@ -112,13 +118,15 @@ class CreateVisualShape(_CreateShape):
     """Visual shape of an object."""
 
     length: PositiveMetres | None = optional("Length of a capsule or cylinder.")
-    flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = optional("VISUAL_SHAPE_... flags.")
-    rgbaColor: Rgba | None = optional("Colour and opacity, each from 0 to 1.")
-    specularColor: Rgb | None = optional("Colour of highlights, each from 0 to 1.")
+    flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = optional("One or more VISUAL_SHAPE_... constants.")
+    rgbaColor: Rgba | None = optional("Colour and opacity: red, green, blue and alpha, each from 0 to 1.")
+    specularColor: Rgb | None = optional("Colour of highlights: red, green and blue, each from 0 to 1.")
     visualFramePosition: Position | None = optional("Position of the shape in the body's frame.")
-    visualFrameOrientation: Quat | None = optional("Orientation in the body's frame as x, y, z, w.")
-    normals: ListOf[Vec3] | None = optional("Normals at the corners of a mesh.")
-    uvs: ListOf[Annotated[tuple[float, float], Field(strict=False)]] | None = optional("Texture coordinates there.")
+    visualFrameOrientation: Quat | None = optional("Orientation of the shape in the body's frame, x, y, z, w.")
+    normals: ListOf[Vec3] | None = optional("Normals at the vertices of a mesh.")
+    uvs: ListOf[Annotated[tuple[float, float], Field(strict=False)]] | None = optional(
+        "Texture coordinates of the vertices of a mesh."
+    )
 
     @model_validator(mode="after")
     def _corners_have_all_or_nothing(self) -> Self:
@@ -134,13 +142,13 @@ class CreateCollisionShape(_CreateShape):
     """Collision shape of an object."""
 
     height: PositiveMetres | None = optional("Length of a capsule or cylinder.")
-    flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = optional("GEOM_... flags.")
+    flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = optional("One or more GEOM_... flags.")
     collisionFramePosition: Position | None = optional("Position of the shape in the body's frame.")
-    collisionFrameOrientation: Quat | None = optional("Orientation in the body's frame as x, y, z, w.")
-    heightfieldTextureScaling: Positive | None = optional("Repetitions of a height field's texture.")
-    heightfieldData: ListOf[Metres] | None = optional("Heights, row by row.")
-    numHeightfieldRows: Count | None = optional("Rows of the height field.")
-    numHeightfieldColumns: Count | None = optional("Columns of the height field.")
+    collisionFrameOrientation: Quat | None = optional("Orientation of the shape in the body's frame, x, y, z, w.")
+    heightfieldTextureScaling: Positive | None = optional("Number of repetitions of a height field's texture.")
+    heightfieldData: ListOf[Metres] | None = optional("Heights of a height field, row by row.")
+    numHeightfieldRows: Count | None = optional("Number of rows of a height field.")
+    numHeightfieldColumns: Count | None = optional("Number of columns of a height field.")
 
     @model_validator(mode="after")
     def _height_field_has_a_source(self) -> Self:
@@ -162,30 +170,42 @@ class ChangeDynamics(PybulletModel):
 
     mass: Kilograms | None = optional("Mass of the base link.")
     lateralFriction: NonNegative | None = optional("Coulomb friction coefficient.")
-    spinningFriction: NonNegative | None = optional("Friction about the contact normal.")
-    rollingFriction: NonNegative | None = optional("Friction against rolling.")
-    restitution: NonNegative | None = optional("Bounciness; 0 does not bounce, 1 keeps all energy.")
-    linearDamping: NonNegative | None = optional("Share of linear velocity lost.")
-    angularDamping: NonNegative | None = optional("Share of angular velocity lost.")
-    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = optional("Stiffness of contacts.")
-    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = optional("Damping of contacts.")
-    frictionAnchor: Switch | None = optional("Whether friction drift is corrected.")
+    spinningFriction: NonNegative | None = optional(
+        "Coefficient of friction against rotation about the contact normal."
+    )
+    rollingFriction: NonNegative | None = optional("Coefficient of friction against rolling.")
+    restitution: NonNegative | None = optional(
+        "Coefficient of restitution: with 0 the body does not bounce, with 1 it loses no energy."
+    )
+    linearDamping: NonNegative | None = optional("Fraction of the linear velocity that is lost per second.")
+    angularDamping: NonNegative | None = optional("Fraction of the angular velocity that is lost per second.")
+    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = optional(
+        "Stiffness of contacts; requires `contactDamping`."
+    )
+    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = optional(
+        "Damping of contacts; requires `contactStiffness`."
+    )
+    frictionAnchor: Switch | None = optional("Whether drift at contacts with friction is corrected.")
     localInertiaDiagonal: (
         Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), Unit("kg m^2")] | None
     ) = optional("Principal moments of inertia of the base link.")
     ccdSweptSphereRadius: NonNegativeMetres | None = optional(
-        "Radius of the sphere for continuous collision detection."
+        "Radius of the sphere that continuous collision detection uses."
     )
-    contactProcessingThreshold: NonNegativeMetres | None = optional("Distance below which contacts are solved.")
-    activationState: Annotated[int, ACTIVATION_STATES] | None = optional("ACTIVATION_STATE_... flags.")
+    contactProcessingThreshold: NonNegativeMetres | None = optional(
+        "Distance between two bodies below which the solver takes their contact into account."
+    )
+    activationState: Annotated[int, ACTIVATION_STATES] | None = optional("One or more ACTIVATION_STATE_... constants.")
     jointDamping: Annotated[NonNegative, Unit("N m s/rad or N s/m")] | None = optional("Damping of the joint.")
-    anisotropicFriction: Vec3 | None = optional("Factors on friction along x, y and z.")
+    anisotropicFriction: Vec3 | None = optional("Factors of the friction along x, y and z.")
     maxJointVelocity: Annotated[Positive, Unit("rad/s or m/s")] | None = optional("Largest velocity of the joint.")
-    collisionMargin: NonNegativeMetres | None = optional("Margin around the shape.")
+    collisionMargin: NonNegativeMetres | None = optional("Margin around the collision shape.")
     jointLowerLimit: Annotated[float, Unit("rad or m")] | None = optional("Lower limit of the joint.")
     jointUpperLimit: Annotated[float, Unit("rad or m")] | None = optional("Upper limit of the joint.")
-    jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = optional("Largest effort at the joint's limits.")
-    sleepThreshold: NonNegative | None = optional("Motion below which the body may sleep.")
+    jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = optional(
+        "Largest effort at the limits of the joint."
+    )
+    sleepThreshold: NonNegative | None = optional("Motion below which the body may be deactivated.")
 
     @model_validator(mode="after")
     def _stiffness_and_damping_together(self) -> ChangeDynamics:
@@ -199,66 +219,80 @@ class ChangeDynamics(PybulletModel):
 class ResetBaseVelocity(PybulletModel):
     """Initial velocity of a body."""
 
-    linearVelocity: Annotated[Vec3, Unit("m/s")] | None = optional("Velocity in the world.")
-    angularVelocity: Annotated[Vec3, Unit("rad/s")] | None = optional("Rotation in the world.")
+    linearVelocity: Annotated[Vec3, Unit("m/s")] | None = optional("Linear velocity in the world frame.")
+    angularVelocity: Annotated[Vec3, Unit("rad/s")] | None = optional("Angular velocity in the world frame.")
 
 
 class SetJointMotorControlArray(PybulletModel):
     """Control mode and gains of a robot's motors."""
 
-    controlMode: Annotated[int, CONTROL_MODES] = Field(description="Quantity of the targets.")
-    positionGains: Gains | None = optional("Position gain: one, one of each driven joint, or by joint.")
-    velocityGains: Gains | None = optional("Velocity gain: one, one of each driven joint, or by joint.")
+    controlMode: Annotated[int, CONTROL_MODES] = Field(
+        description="Control mode of the motors, which determines the quantity of the targets."
+    )
+    positionGains: Gains | None = optional(
+        "Position gains: one for all joints, a list with one for each driven joint, or a mapping from joint names to "
+        "gains."
+    )
+    velocityGains: Gains | None = optional(
+        "Velocity gains: one for all joints, a list with one for each driven joint, or a mapping from joint names to "
+        "gains."
+    )
 
 
 class ObjectTf(ConfigModel):
     """The TF frame that an object or camera follows."""
 
-    tf_id: FrameId = Field(description="Name of the frame.")
-    hz: Hz = Field(30.0, description="Rate of look-ups.")
-    timeout_s: Seconds = Field(0.5, description="Without anything new for so long, it is reported as stale.")
+    tf_id: FrameId = Field(description="Name of the TF frame.")
+    hz: Hz = Field(30.0, description="Rate at which the frame is looked up.")
+    timeout_s: Seconds = Field(
+        0.5, description="Time without a new pose after which a warning reports the frame as stale."
+    )
 
     max_speed: Annotated[Positive, Field(le=100.0), Unit("m/s")] = Field(
-        5.0, description="Largest speed of what can be touched."
+        5.0, description="Largest speed with which a body with contacts follows the frame."
     )
     max_angular_speed: Annotated[Positive, Field(le=100.0), Unit("rad/s")] = Field(
-        10.0, description="Fastest rotation of what can be touched."
+        10.0, description="Largest angular speed with which a body with contacts follows the frame."
     )
 
 
 class LoadSoftBody(PybulletModel):
     """A soft body: mesh, placement and material."""
 
-    fileName: ExistingFile = Field(description="Mesh: tetrahedra (.vtk) or a surface (.obj).")
-    simFileName: ExistingFile | None = optional("Mesh to simulate (.vtk) where `fileName` is only what it looks like.")
-    basePosition: Position | None = optional("Start position.")
-    baseOrientation: Quat | None = optional("Start orientation as x, y, z, w.")
-    scale: Positive | None = optional("Factor on all lengths of the mesh.")
+    fileName: ExistingFile = Field(description="Mesh file: tetrahedra (.vtk) or a surface (.obj).")
+    simFileName: ExistingFile | None = optional(
+        "Mesh file for the simulation (.vtk). By default, `fileName`; otherwise `fileName` is only displayed."
+    )
+    basePosition: Position | None = optional("Start position in the world.")
+    baseOrientation: Quat | None = optional("Start orientation in the world, x, y, z, w.")
+    scale: Positive | None = optional("Scale factor of the mesh.")
     mass: Annotated[Kilograms, Field(gt=0)] | None = optional("Mass of the whole body.")
     collisionMargin: NonNegativeMetres | None = optional("Margin around the surface.")
-    useMassSpring: Switch | None = optional("Whether it is made of springs, as cloth is.")
-    useBendingSprings: Switch | None = optional("Whether springs resist bending as well.")
-    useNeoHookean: Switch | None = optional("Whether it is a neo-Hookean solid; needs tetrahedra.")
+    useMassSpring: Switch | None = optional("Whether springs connect the vertices, as in cloth.")
+    useBendingSprings: Switch | None = optional("Whether additional springs resist bending.")
+    useNeoHookean: Switch | None = optional("Whether the body is a neo-Hookean solid; requires tetrahedra.")
     springElasticStiffness: Stiffness | None = optional("Stiffness of the springs.")
     springDampingStiffness: Annotated[NonNegative, Unit("N s/m")] | None = optional("Damping of the springs.")
     springDampingAllDirections: Switch | None = optional(
-        "Whether damping acts in all directions, else along the springs."
+        "Whether springs damp motion in all directions, otherwise only along the springs."
     )
-    springBendingStiffness: Stiffness | None = optional("Stiffness against bending.")
-    NeoHookeanMu: Pressure | None = optional("First Lame parameter, against shear.")
-    NeoHookeanLambda: Pressure | None = optional("Second Lame parameter, against compression.")
-    NeoHookeanDamping: NonNegative | None = optional("Damping of the solid.")
+    springBendingStiffness: Stiffness | None = optional("Stiffness of the springs that resist bending.")
+    NeoHookeanMu: Pressure | None = optional("First Lame parameter of a neo-Hookean solid, its resistance to shear.")
+    NeoHookeanLambda: Pressure | None = optional(
+        "Second Lame parameter of a neo-Hookean solid, its resistance to compression."
+    )
+    NeoHookeanDamping: NonNegative | None = optional("Damping of a neo-Hookean solid.")
     frictionCoeff: NonNegative | None = optional("Coulomb friction coefficient.")
-    useFaceContact: Switch | None = optional("Whether faces touch too, not only corners.")
-    useSelfCollision: Switch | None = optional("Whether it touches itself.")
-    repulsionStiffness: Stiffness | None = optional("Stiffness of the push out of contact.")
+    useFaceContact: Switch | None = optional("Whether faces collide, in addition to vertices.")
+    useSelfCollision: Switch | None = optional("Whether parts of the body collide with each other.")
+    repulsionStiffness: Stiffness | None = optional("Stiffness of the repulsion at contacts.")
 
 
 class ChangeVisualShape(PybulletModel):
     """Colours that replace the colours in the object's file."""
 
-    rgbaColor: Rgba | None = optional("Colour and opacity, each from 0 to 1.")
-    specularColor: Rgb | None = optional("Colour of highlights, each from 0 to 1.")
+    rgbaColor: Rgba | None = optional("Colour and opacity: red, green, blue and alpha, each from 0 to 1.")
+    specularColor: Rgb | None = optional("Colour of highlights: red, green and blue, each from 0 to 1.")
 
 
 class CreateSoftBodyAnchor(PybulletModel):
@@ -269,9 +303,11 @@ class CreateSoftBodyAnchor(PybulletModel):
     own id may come first, as in PyBullet, and is ignored.
     """
 
-    node: Count = Field(description="Number of the corner in the simulated mesh.")
-    body: Text | None = optional("Name of the body that it is tied to, none for the world.")
-    link: Text | Annotated[int, Field(ge=-1)] = Field(-1, description="Name or index of its link.")
+    node: Count = Field(description="Index of the vertex in the simulated mesh.")
+    body: Text | None = optional("Body to which the vertex is tied. By default, the vertex is fixed in the world.")
+    link: Text | Annotated[int, Field(ge=-1)] = Field(
+        -1, description="Name or index of the body's link to which the vertex is tied; -1 is the base."
+    )
     position: tuple[Metres, Metres, Metres] = Field(
         (0.0, 0.0, 0.0), strict=False, description="Accepted without effect, as in PyBullet."
     )

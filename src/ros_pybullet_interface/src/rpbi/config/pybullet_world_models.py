@@ -40,13 +40,13 @@ class Connect(PybulletModel):
 
     connection_mode: Annotated[int, CONNECTION_MODES] = Field(
         pybullet.GUI,
-        description="GUI opens PyBullet's window, DIRECT needs no screen.",
+        description="GUI opens PyBullet's window; DIRECT does not need a screen.",
         json_schema_extra={"default": "GUI"},
     )
-    options: Text | None = optional("Further options, such as `--mp4=FILE` to record the window.")
-    key: Count | None = optional("Key of the shared memory.")
-    hostName: Text | None = optional("Host of a server to connect to.")
-    port: Annotated[int, Field(ge=1, le=65535)] | None = optional("Port of that server.")
+    options: Text | None = optional("Further options of the connection, such as `--mp4=FILE` to record the window.")
+    key: Count | None = optional("Key of the shared memory, for the connection mode SHARED_MEMORY.")
+    hostName: Text | None = optional("Host of the PyBullet server to connect to.")
+    port: Annotated[int, Field(ge=1, le=65535)] | None = optional("Port of the PyBullet server.")
 
     @model_validator(mode="after")
     def _one_way_to_connect(self) -> Connect:
@@ -62,15 +62,15 @@ class Connect(PybulletModel):
 class ResetSimulation(PybulletModel):
     """Kind of world: with or without soft bodies."""
 
-    flags: Annotated[int, RESET_FLAGS] | None = optional("RESET_USE_... flags.")
+    flags: Annotated[int, RESET_FLAGS] | None = optional("One or more RESET_USE_... constants.")
 
 
 class SetGravity(PybulletModel):
     """Gravity; zero by default."""
 
-    gravX: Acceleration = Field(0.0, description="Acceleration along x.")
-    gravY: Acceleration = Field(0.0, description="Acceleration along y.")
-    gravZ: Acceleration = Field(0.0, description="Acceleration along z, -9.81 on Earth.")
+    gravX: Acceleration = Field(0.0, description="Acceleration along the world's x axis.")
+    gravY: Acceleration = Field(0.0, description="Acceleration along the world's y axis.")
+    gravZ: Acceleration = Field(0.0, description="Acceleration along the world's z axis; -9.81 on Earth.")
 
     def kwargs(self) -> dict[str, Any]:
         """Returns all three keyword arguments, which PyBullet requires."""
@@ -80,36 +80,56 @@ class SetGravity(PybulletModel):
 class SetPhysicsEngineParameter(PybulletModel):
     """Parameters of the solver, except `fixedTimeStep`, which the main file's key `timeStep` sets."""
 
-    numSolverIterations: Iterations | None = optional("Most iterations of the solver.")
-    useSplitImpulse: Switch | None = optional("Whether penetration is solved apart from velocity.")
-    splitImpulsePenetrationThreshold: Metres | None = optional("Penetration from which it is solved apart.")
-    numSubSteps: Annotated[Count, Field(le=1_000)] | None = optional("Parts that each step is divided into.")
-    collisionFilterMode: Count | None = optional("0: both masks must match, 1: one of them.")
-    contactBreakingThreshold: NonNegativeMetres | None = optional("Distance at which contacts end.")
-    maxNumCmdPer1ms: Annotated[int, Field(ge=-1, lt=2**31)] | None = optional("Most commands in a millisecond.")
-    enableFileCaching: Switch | None = optional("Whether files are read once only.")
+    numSolverIterations: Iterations | None = optional("Largest number of solver iterations in a step.")
+    useSplitImpulse: Switch | None = optional(
+        "Whether penetration is corrected separately, without effect on velocities."
+    )
+    splitImpulsePenetrationThreshold: Metres | None = optional("Penetration above which it is corrected separately.")
+    numSubSteps: Annotated[Count, Field(le=1_000)] | None = optional("Number of parts into which each step is divided.")
+    collisionFilterMode: Count | None = optional(
+        "Rule for collision filters: 0 if the masks of both bodies must match, 1 if one match is enough."
+    )
+    contactBreakingThreshold: NonNegativeMetres | None = optional("Distance above which a contact ends.")
+    maxNumCmdPer1ms: Annotated[int, Field(ge=-1, lt=2**31)] | None = optional(
+        "Largest number of commands per millisecond."
+    )
+    enableFileCaching: Switch | None = optional("Whether each file is read only once.")
     restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = optional(
-        "Velocity below which nothing bounces."
+        "Velocity below which bodies do not bounce."
     )
-    erp: NonNegative | None = optional("Share of a joint's error mended in a step.")
-    contactERP: NonNegative | None = optional("Share of a contact's error mended in a step.")
-    frictionERP: NonNegative | None = optional("The same for friction, if anchored.")
-    enableConeFriction: Switch | None = optional("Whether friction is a cone, else a pyramid.")
-    deterministicOverlappingPairs: Switch | None = optional("Whether contacts are sorted.")
-    allowedCcdPenetration: NonNegativeMetres | None = optional("Penetration allowed to continuous collision detection.")
+    erp: NonNegative | None = optional("Fraction of a joint's error that is corrected in a step.")
+    contactERP: NonNegative | None = optional("Fraction of a contact's penetration that is corrected in a step.")
+    frictionERP: NonNegative | None = optional(
+        "Fraction of the drift at a contact with a friction anchor that is corrected in a step."
+    )
+    enableConeFriction: Switch | None = optional("Whether friction limits form a cone, otherwise a pyramid.")
+    deterministicOverlappingPairs: Switch | None = optional(
+        "Whether overlapping pairs of bodies are sorted, so that results are reproducible."
+    )
+    allowedCcdPenetration: NonNegativeMetres | None = optional(
+        "Penetration that continuous collision detection permits."
+    )
     jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = optional(
-        "JOINT_FEEDBACK_... flags: frame of the force and torque of a joint."
+        "One or more JOINT_FEEDBACK_... constants, which select the frame of a joint's reaction force and torque."
     )
-    solverResidualThreshold: NonNegative | None = optional("Residual at which the solver stops.")
-    contactSlop: NonNegativeMetres | None = optional("Penetration left alone.")
-    enableSAT: Switch | None = optional("Whether the separating axis test is used.")
-    constraintSolverType: Annotated[int, SOLVER_TYPES] | None = optional("CONSTRAINT_SOLVER_LCP_... constant.")
-    globalCFM: NonNegative | None = optional("Softness of all constraints.")
-    minimumSolverIslandSize: Count | None = optional("Fewest constraints solved together.")
-    reportSolverAnalytics: Switch | None = optional("Whether the solver reports its steps.")
-    warmStartingFactor: NonNegative | None = optional("Share of the last step's solution reused.")
-    sparseSdfVoxelSize: PositiveMetres | None = optional("Voxel size for soft bodies.")
-    numNonContactInnerIterations: Iterations | None = optional("Iterations on joints in each of the solver's.")
+    solverResidualThreshold: NonNegative | None = optional("Residual below which the solver stops.")
+    contactSlop: NonNegativeMetres | None = optional("Penetration that is not corrected.")
+    enableSAT: Switch | None = optional("Whether collision detection uses the separating axis test.")
+    constraintSolverType: Annotated[int, SOLVER_TYPES] | None = optional(
+        "Solver of constraints, a CONSTRAINT_SOLVER_LCP_... constant."
+    )
+    globalCFM: NonNegative | None = optional("Constraint force mixing: softness of all constraints.")
+    minimumSolverIslandSize: Count | None = optional("Least number of constraints that are solved together.")
+    reportSolverAnalytics: Switch | None = optional("Whether the solver reports statistics of each step.")
+    warmStartingFactor: NonNegative | None = optional(
+        "Fraction of the last step's solution with which the solver starts."
+    )
+    sparseSdfVoxelSize: PositiveMetres | None = optional(
+        "Voxel size of the signed distance field for collisions of soft bodies."
+    )
+    numNonContactInnerIterations: Iterations | None = optional(
+        "Number of iterations on joints in each iteration of the solver."
+    )
 
 
 PhysicsChange = SetGravity | SetPhysicsEngineParameter
@@ -132,18 +152,18 @@ class ConfigureDebugVisualizer(PybulletModel):
         AlsoTakes(VISUALIZER_FLAGS.one_or_several_schema()),
     ] = Field(
         (pybullet.COV_ENABLE_GUI,),
-        description="COV_... constants to switch.",
+        description="One or more COV_... constants: options that are switched on or off.",
         json_schema_extra={"default": "COV_ENABLE_GUI"},
     )
-    enable: Switch = Field(False, description="Whether they are switched on.")
-    lightPosition: Position | None = optional("Where the light is.")
-    shadowMapResolution: Annotated[Count, Unit("px")] | None = optional("Resolution of shadows.")
-    shadowMapWorldSize: Annotated[Count, Unit("m")] | None = optional("Extent of shadows.")
+    enable: Switch = Field(False, description="Whether the options in `flag` are switched on, otherwise off.")
+    lightPosition: Position | None = optional("Position of the light in the world.")
+    shadowMapResolution: Annotated[Count, Unit("px")] | None = optional("Resolution of the shadows.")
+    shadowMapWorldSize: Annotated[Count, Unit("m")] | None = optional("Side of the area in which shadows are drawn.")
     remoteSyncTransformInterval: Annotated[NonNegative, Unit("s")] | None = optional(
-        "Time between updates of a remote window."
+        "Time between two updates of a remote window."
     )
-    shadowMapIntensity: NonNegative | None = optional("Darkness of shadows, 0 to 1.")
-    rgbBackground: Rgb | None = optional("Colour of the background, each from 0 to 1.")
+    shadowMapIntensity: NonNegative | None = optional("Darkness of shadows, from 0 to 1.")
+    rgbBackground: Rgb | None = optional("Colour of the background: red, green and blue, each from 0 to 1.")
 
     def calls(self) -> list[dict[str, Any]]:
         """Returns one set of keyword arguments per flag, since PyBullet accepts only one flag in a call."""
@@ -154,10 +174,12 @@ class ConfigureDebugVisualizer(PybulletModel):
 class ResetDebugVisualizerCamera(PybulletModel):
     """Camera of PyBullet's window."""
 
-    cameraDistance: PositiveMetres = Field(1.0, description="Distance from the target.")
-    cameraYaw: Degrees = Field(0.0, description="Angle about the vertical.")
-    cameraPitch: Degrees = Field(1.0, description="Angle above the horizontal, negative looks down.")
-    cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="Point that it looks at.")
+    cameraDistance: PositiveMetres = Field(1.0, description="Distance of the camera from the target point.")
+    cameraYaw: Degrees = Field(0.0, description="Rotation of the camera about the world's z axis.")
+    cameraPitch: Degrees = Field(1.0, description="Angle above the horizontal; a negative angle looks down.")
+    cameraTargetPosition: Position = Field(
+        (0.0, 0.0, 0.0), description="Target point in the world, to which the camera looks."
+    )
 
     def kwargs(self) -> dict[str, Any]:
         """Returns all four keyword arguments, which PyBullet requires."""

@@ -34,9 +34,9 @@ class SensorConfig(ConfigModel):
 
     model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # subclasses have further keys
 
-    type: Text = Field(description="Its class, as `module:Class`.")
-    name: Name = Field(description="Its name, by which its body has no other sensor; topics are named after it.")
-    hz: Hz = Field(description="Rate of its samples, in the world's time.")
+    type: Text = Field(description="Class of the sensor, as `module:Class`.")
+    name: Name = Field(description="Name of the sensor, unique on its body; topics are named after it.")
+    hz: Hz = Field(description="Rate of the samples, in simulated time.")
 
 
 class ContactsConfig(ConfigModel):
@@ -44,11 +44,13 @@ class ContactsConfig(ConfigModel):
 
     hz: Hz = Field(50.0, description="Rate of `rpbi/NAME/contacts`.")
     average: Switch = Field(
-        False, description="Whether these are means over all ticks since the last sample, not those of the last tick."
+        False,
+        description="Whether forces are averaged over all ticks since the last message, otherwise those of the last "
+        "tick.",
     )
-    arrows_hz: HzOrOff = Field(20.0, description="Rate of the arrows for RViz; 0 is off.")
+    arrows_hz: HzOrOff = Field(20.0, description="Rate of the arrows that RViz shows; 0 is off.")
     arrow_metres_per_newton: Annotated[Positive, Unit("m/N")] = Field(
-        0.01, description="Length of an arrow by the force that it stands for."
+        0.01, description="Length of an arrow for each newton of its force."
     )
 
 
@@ -68,22 +70,28 @@ Deviation = Annotated[
 class ForceTorqueConfig(ConfigModel):
     """A force-torque sensor in a joint."""
 
-    joint: Text = Field(description="Joint that it sits in.")
-    hz: Hz | None = optional("Rate of its samples; without it, that of the joint states.")
-    frame_id: FrameId | None = optional("Other name of the frame of the joint's child link, in which the samples are.")
-    acting: Literal["parent_on_child", "child_on_parent"] = Field(
-        "parent_on_child", description="Direction of action, which decides the sign."
+    joint: Text = Field(description="Joint that contains the sensor.")
+    hz: Hz | None = optional("Rate of the samples. By default, the rate of the joint states.")
+    frame_id: FrameId | None = optional(
+        "Frame name in messages, instead of the name of the joint's child link, in whose frame samples are given."
     )
-    low_pass_hz: Hz | None = optional("Frequency at which a first-order low-pass lets 71 % through.")
+    acting: Literal["parent_on_child", "child_on_parent"] = Field(
+        "parent_on_child", description="Direction of the measured force and torque, which determines their sign."
+    )
+    low_pass_hz: Hz | None = optional(
+        "Cut-off frequency (-3 dB) of a first-order low-pass filter. By default, samples are not filtered."
+    )
     noise_force_n: Annotated[Deviation, Unit("N")] = Field(
-        (0.0, 0.0, 0.0), description="Standard deviation of the forces' noise."
+        (0.0, 0.0, 0.0),
+        description="Standard deviation of the force noise along x, y and z, or one number for all axes.",
     )
     noise_torque_nm: Annotated[Deviation, Unit("N m")] = Field(
-        (0.0, 0.0, 0.0), description="Standard deviation of the moments' noise."
+        (0.0, 0.0, 0.0),
+        description="Standard deviation of the torque noise about x, y and z, or one number for all axes.",
     )
-    bias_force_n: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="Offset of the forces.")
-    bias_torque_nm: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Offset of the moments.")
-    seed: Count | None = optional("Seed of the noise; without it, one that follows from the names.")
+    bias_force_n: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="Constant offset of the force.")
+    bias_torque_nm: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Constant offset of the torque.")
+    seed: Count | None = optional("Seed of the noise. By default, computed from the name of the sensor.")
 
 
 def _from_name(given: Any) -> Any:
@@ -105,11 +113,11 @@ ImageSide = Annotated[int, Field(gt=0, le=8192, json_schema_extra={"unit": "px"}
 class IntrinsicsConfig(ConfigModel):
     """Size and field of view of the images."""
 
-    width: ImageSide = Field(640, description="Columns of the images.")
-    height: ImageSide = Field(480, description="Rows of the images.")
+    width: ImageSide = Field(640, description="Width of the images.")
+    height: ImageSide = Field(480, description="Height of the images.")
     fov: float = Field(40.0, gt=0, lt=180, description="Vertical field of view.", json_schema_extra={"unit": "deg"})
     range: Annotated[tuple[PositiveMetres, PositiveMetres], Field(strict=False)] = Field(
-        (0.01, 100.0), description="Nearest and farthest distance along the optical axis."
+        (0.01, 100.0), description="Nearest and farthest visible distance along the optical axis."
     )
 
     @model_validator(mode="after")
@@ -124,13 +132,15 @@ class RgbdSensorConfig(ConfigModel):
     """A camera that takes colour, depth and segmentation images."""
 
     name: Name = Field(description="Name of the camera, unique among all objects.")
-    hz: Hz = Field(30.0, description="Images in a second.")
-    pointcloud: Switch = Field(False, description="Whether point clouds are published too.")
+    hz: Hz = Field(30.0, description="Rate of the images, in simulated time.")
+    pointcloud: Switch = Field(False, description="Whether the camera also publishes point clouds.")
     synchronous: Switch = Field(False, description="Whether the simulation waits for every image.")
-    depth_noise_m: NonNegativeMetres = Field(0.0, description="Standard deviation of the depths' noise.")
+    depth_noise_m: NonNegativeMetres = Field(0.0, description="Standard deviation of the depth noise.")
     depth_noise_growth_per_m: Annotated[NonNegative, Unit("1/m")] = Field(
-        0.0, description="Growth of that deviation with the squared depth; about 0.0014 for a structured-light camera."
+        0.0,
+        description="Factor of the squared depth that is added to the standard deviation of the depth noise; about "
+        "0.0014 for a structured-light camera.",
     )
-    seed: Count | None = optional("Seed of the noise; without it, one that follows from the name.")
+    seed: Count | None = optional("Seed of the depth noise. By default, computed from the name of the camera.")
     intrinsics: IntrinsicsConfig = Field(IntrinsicsConfig(), description="Image size, field of view and range.")
     object_tf: ObjectTf = Field(description="TF frame of the camera: x right, y down, z forward.")

@@ -94,11 +94,14 @@ class StaticFrame(ConfigModel):
     """A TF frame with a fixed pose, which the interface publishes. No other node should publish the frame."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
-    parent: FrameId = Field(WORLD_FRAME, description="The frame that its pose is in.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Its position.")
-    orientation: Quat | None = optional("Its orientation, x, y, z, w; none by default.")
+    parent: FrameId = Field(WORLD_FRAME, description="Parent frame, in which position and orientation are given.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Position in the parent frame.")
+    orientation: Quat | None = optional(
+        "Orientation in the parent frame, x, y, z, w. By default, that of the parent frame."
+    )
     rpy: Annotated[Vec3, Unit("rad")] | None = optional(
-        "Its orientation in other words: roll, pitch and yaw, about the fixed x, y and z one after the other."
+        "Orientation in the parent frame as roll, pitch and yaw about the fixed x, y and z axes, in this order; "
+        "instead of `orientation`."
     )
 
     @model_validator(mode="after")
@@ -119,14 +122,14 @@ class StaticFrame(ConfigModel):
 class ControlsConfig(ConfigModel):
     """The window with buttons, see docs/controls.md."""
 
-    robot_name: Text | None = optional("Robot whose joints it shows first; without it, the first one.")
+    robot_name: Text | None = optional("Robot whose joints the window shows first. By default, the first robot.")
 
 
 class AttachmentPose(ConfigModel):
     """Pose of an attachment on a link, in the link's URDF frame."""
 
-    position: Position = Field((0.0, 0.0, 0.0), description="Its position.")
-    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation, x, y, z, w.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Position in the link's URDF frame.")
+    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation in the link's URDF frame, x, y, z, w.")
 
     @property
     def pose(self) -> Pose:
@@ -137,17 +140,24 @@ class AttachmentPose(ConfigModel):
 class AttachmentConfig(ConfigModel):
     """An attachment, which ties a link of one body to a link of another body like a magnet or a tool changer."""
 
-    name: Name = Field(description="Its name, by which it is detached.")
-    parent: Text = Field(description="The parent: an object, or one of its links as NAME/LINK.")
-    child: Text = Field(description="The child: likewise.")
-    kind: Literal["fixed", "ball"] = Field("fixed", description="`fixed` holds the pose, `ball` the position alone.")
+    name: Name = Field(description="Unique name of the attachment; `rpbi/detach` expects this name.")
+    parent: Text = Field(description="Body that holds the child: NAME, or NAME/LINK for one of its links.")
+    child: Text = Field(description="Body that is held: NAME, or NAME/LINK for one of its links.")
+    kind: Literal["fixed", "ball"] = Field(
+        "fixed", description="`fixed` holds position and orientation, `ball` holds the position only."
+    )
     parent_pose: AttachmentPose | None = optional(
-        "Its place on the parent; by default the present one, so that nothing moves."
+        "Pose of the attachment in the URDF frame of the parent's link. By default, computed from `child_pose` such "
+        "that the bodies do not move."
     )
     child_pose: AttachmentPose | None = optional(
-        "Its place on the child; its origin if neither is given. If both are, they are pulled together."
+        "Pose of the attachment in the URDF frame of the child's link. By default, computed from `parent_pose` such "
+        "that the bodies do not move, or the origin if both are missing. If both are given, the bodies are pulled "
+        "together."
     )
-    max_force: Annotated[Positive, Unit("N")] | None = optional("Force that it breaks beyond; none by default.")
+    max_force: Annotated[Positive, Unit("N")] | None = optional(
+        "Force above which the attachment breaks. By default, it never breaks."
+    )
 
 
 class WorldConfig(ConfigModel):
@@ -157,66 +167,79 @@ class WorldConfig(ConfigModel):
 
     connect: Connect = Field(Connect(), description="Connection to PyBullet.")
     setAdditionalSearchPath: Folders = Field(
-        (), description="Folders to look for files in; `pybullet_data_path` is that of PyBullet's data."
+        (), description="Folders in which files are searched; `pybullet_data_path` stands for PyBullet's data folder."
     )
-    resetSimulation: ResetSimulation = Field(ResetSimulation(), description="Kind of world.")
-    setGravity: SetGravity = Field(SetGravity(), description="Gravity; there is none unless given.")
-    timeStep: Annotated[Seconds, AfterValidator(_whole_nanoseconds)] = Field(0.02, description="Length of a step.")
+    resetSimulation: ResetSimulation = Field(
+        ResetSimulation(), description="Kind of PyBullet world, for instance for soft bodies."
+    )
+    setGravity: SetGravity = Field(SetGravity(), description="Gravity. By default, there is no gravity.")
+    timeStep: Annotated[Seconds, AfterValidator(_whole_nanoseconds)] = Field(0.02, description="Duration of a tick.")
     setPhysicsEngineParameter: SetPhysicsEngineParameter = Field(
-        SetPhysicsEngineParameter(), description="Solver of contacts and joints."
+        SetPhysicsEngineParameter(), description="Parameters of the physics engine."
     )
     real_time_factor: Annotated[NonNegative, AfterValidator(checked_real_time_factor)] = Field(
-        1.0, description="Simulated seconds in a second of wall time, at least 0.001; 0 is as fast as possible."
+        1.0, description="Simulated seconds per second of wall time, at least 0.001; 0 runs as fast as possible."
     )
-    clock_hz: Hz | None = optional("Most /clock messages in a second of wall time.")
-    tf_prefix: FrameId | None = optional("Prefix of all TF frames, so that two worlds can share one TF tree.")
+    clock_hz: Hz | None = optional(
+        "Largest rate of /clock messages, in wall time. By default, the smaller of 1000 Hz and the rate of the "
+        "ticks, and 250 Hz with `real_time_factor: 0`."
+    )
+    tf_prefix: FrameId | None = optional(
+        "Prefix of all TF frames, so that two worlds can share one TF tree. By default, frames have no prefix."
+    )
     step_pybullet_manually: Switch = Field(
-        False, description="Accepted without effect: the interface does every step itself."
+        False, description="Accepted without effect: the interface makes every step itself."
     )
     start_pybullet_after_initialization: Switch = Field(
-        True, description="Whether the world runs at once, else from the first `rpbi/start`."
+        True,
+        description="Whether the simulation starts at once; otherwise it starts at the first call of `rpbi/start`.",
     )
-    status_hz: Hz = Field(50.0, description="Rate of `rpbi/status`.")
+    status_hz: Hz = Field(50.0, description="Rate of `rpbi/status`, in wall time.")
     state_hz: HzOrOff = Field(10.0, description="Rate of `rpbi/state`, in wall time; 0 is off.")
     state_hash_hz: HzOrOff = Field(
-        1.0, description="Rate of the hashes in `rpbi/state`, in the world's time, by which recordings are replayed."
+        1.0,
+        description="Rate of the state hashes in `rpbi/state`, in simulated time; replays of recordings compare "
+        "these hashes.",
     )
     keyframe_every_s: NonNegative = Field(
         0.0,
-        description="Period of keyframes, in the world's time, at which saved states and replays begin; 0 is none.",
+        description="Time between two keyframes, in simulated time; saved states and replays begin at a keyframe. 0 "
+        "disables keyframes.",
         json_schema_extra={"unit": "s"},
     )
     configureDebugVisualizer: ConfigureDebugVisualizer = Field(
-        ConfigureDebugVisualizer(), description="Content of PyBullet's window."
+        ConfigureDebugVisualizer(), description="Rendering options of PyBullet's window."
     )
     resetDebugVisualizerCamera: ResetDebugVisualizerCamera = Field(
-        ResetDebugVisualizerCamera(), description="Where PyBullet's window looks from."
+        ResetDebugVisualizerCamera(), description="Viewpoint of PyBullet's window."
     )
     enable_keyboard_publisher: Switch = Field(
-        False, description="Whether keys pressed in PyBullet's window are on `rpbi/keyboard`."
+        False, description="Whether key events of PyBullet's window are published on `rpbi/keyboard`."
     )
     enable_mouse_publisher: Switch = Field(
-        False, description="Whether what the mouse does in PyBullet's window is on `rpbi/mouse`."
+        False, description="Whether mouse events of PyBullet's window are published on `rpbi/mouse`."
     )
     publish_visualizer_image_hz: HzOrOff = Field(
-        0.0, description="Rate of `rpbi/visualizer_image`, what PyBullet's window shows, in wall time; 0 is off."
+        0.0, description="Rate of `rpbi/visualizer_image`, the image in PyBullet's window, in wall time; 0 is off."
     )
-    visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
-    visualizer_image_height: Pixels = Field(480, description="Its rows.")
-    markers_hz: HzOrOff = Field(10.0, description="Rate of updates of `rpbi/markers`, in wall time; 0 is off.")
-    controls: ControlsConfig | None = optional("The window with buttons that `./rpbi launch WORLD.yaml` opens.")
-    poses: ListOf[StaticFrame] = Field((), description="Poses of TF frames that no other node publishes.")
-    attachments: ListOf[AttachmentConfig] = Field((), description="Attachments from the start on.")
+    visualizer_image_width: Pixels = Field(640, description="Width of the images on `rpbi/visualizer_image`.")
+    visualizer_image_height: Pixels = Field(480, description="Height of the images on `rpbi/visualizer_image`.")
+    markers_hz: HzOrOff = Field(10.0, description="Largest rate of `rpbi/markers`, in wall time; 0 is off.")
+    controls: ControlsConfig | None = optional("Window with buttons that `./rpbi launch WORLD.yaml` opens.")
+    poses: ListOf[StaticFrame] = Field((), description="TF frames with fixed poses, which no other node publishes.")
+    attachments: ListOf[AttachmentConfig] = Field(
+        (), description="Attachments between bodies that exist from the start."
+    )
     objects: ListOf[FileOrOverrides] = Field(
-        (), description="Files of objects of your own types, see docs/extending.md."
+        (), description="Files of objects of your own types; see docs/extending.md."
     )
     trusted_packages: ListOf[Text] = Field(
         (),
-        description="Python packages from which services may import types, beside the types that are used at the "
-        "start.",
+        description="Python packages from which services may import types, in addition to the types that the world "
+        "uses at the start.",
     )
     rgbd_sensor: RgbdSensorConfig | None = optional(
-        "Camera of colour, depth and segmentation; the first one if there are several."
+        "RGB-D camera with colour, depth and segmentation images; the first one if there are several."
     )
     rgbd_sensors: ListOf[FileOrOverrides] = Field((), description="Files of further cameras.")
 

@@ -82,22 +82,26 @@ class PlanarVelocity(NamedTuple):
 class PlanarBaseConfig(ConfigModel):
     """Velocity, acceleration and force limits of a base that drives over the ground."""
 
-    max_linear_velocity: Annotated[Positive, Unit("m/s")] = Field(1.0, description="Largest speed in any direction.")
-    max_angular_velocity: Annotated[Positive, Unit("rad/s")] = Field(1.5, description="Fastest rotation.")
+    max_linear_velocity: Annotated[Positive, Unit("m/s")] = Field(
+        1.0, description="Largest speed in the plane, in any direction."
+    )
+    max_angular_velocity: Annotated[Positive, Unit("rad/s")] = Field(1.5, description="Largest yaw rate.")
     max_linear_acceleration: Annotated[Positive, Unit("m/s^2")] = Field(
-        1.0, description="Largest change of the velocity, when it brakes as well."
+        1.0, description="Largest acceleration in the plane, also when braking."
     )
     max_angular_acceleration: Annotated[Positive, Unit("rad/s^2")] = Field(
-        3.0, description="Largest change of the rotation."
+        3.0, description="Largest angular acceleration about the vertical, also when braking."
     )
     max_force: Annotated[Positive, Unit("N")] | None = Field(
-        None, description="Largest push along each axis of the plane; without it, the weight of the robot."
+        None, description="Largest driving force along each axis of the plane. By default, the weight of the robot."
     )
     max_torque: Annotated[Positive, Unit("N m")] | None = Field(
-        None, description="Largest torque about the vertical; without it, the weight at the radius of gyration."
+        None,
+        description="Largest driving torque about the vertical. By default, the robot's weight times its radius of "
+        "gyration.",
     )
     cmd_vel_timeout_s: Seconds = Field(
-        0.5, description="Age at which a velocity expires and the base brakes, in the world's time."
+        0.5, description="Age at which a velocity command expires and the base brakes, in simulated time."
     )
 
 

@@ -33,16 +33,24 @@ PositiveRange = Annotated[
 class DynamicsVariation(ConfigModel):
     """Random dynamics of a body or a link; each number is drawn uniformly from its range once per episode."""
 
-    object: Text = Field(description="`NAME`, or `NAME/LINK` for one of its links.")
-    mass: PositiveRange | None = Field(None, description="Mass [kg].")
-    mass_factor: PositiveRange | None = Field(None, description="Factor on the mass that it has at the start.")
-    lateralFriction: PositiveRange | None = Field(None, description="Coulomb friction coefficient.")
-    spinningFriction: PositiveRange | None = Field(None, description="Friction about the contact normal.")
-    rollingFriction: PositiveRange | None = Field(None, description="Friction against rolling.")
-    restitution: PositiveRange | None = Field(None, description="Bounciness.")
-    linearDamping: PositiveRange | None = Field(None, description="Share of linear velocity lost.")
-    angularDamping: PositiveRange | None = Field(None, description="Share of angular velocity lost.")
-    jointDamping: PositiveRange | None = Field(None, description="Damping of the joint.")
+    object: Text = Field(description="Body, or one of its links as `NAME/LINK`.")
+    mass: PositiveRange | None = Field(None, description="Range of the mass [kg]. By default, the mass is not changed.")
+    mass_factor: PositiveRange | None = Field(None, description="Range of the factor by which the mass is multiplied.")
+    lateralFriction: PositiveRange | None = Field(None, description="Range of the Coulomb friction coefficient.")
+    spinningFriction: PositiveRange | None = Field(
+        None, description="Range of the coefficient of friction against rotation about the contact normal."
+    )
+    rollingFriction: PositiveRange | None = Field(
+        None, description="Range of the coefficient of friction against rolling."
+    )
+    restitution: PositiveRange | None = Field(None, description="Range of the coefficient of restitution.")
+    linearDamping: PositiveRange | None = Field(
+        None, description="Range of the fraction of the linear velocity that is lost per second."
+    )
+    angularDamping: PositiveRange | None = Field(
+        None, description="Range of the fraction of the angular velocity that is lost per second."
+    )
+    jointDamping: PositiveRange | None = Field(None, description="Range of the joint's damping [N m s/rad or N s/m].")
 
     def apply(self, world: World, random: np.random.Generator) -> None:
         """Sets the dynamics to random values."""
@@ -56,9 +64,13 @@ class DynamicsVariation(ConfigModel):
 class PoseVariation(ConfigModel):
     """Random start pose of a body: offsets from the configured pose."""
 
-    object: Name = Field(description="The body.")
-    position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")
-    yaw: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest turn about the vertical, either way.")
+    object: Name = Field(description="Name of the body.")
+    position: Annotated[Vec3, Unit("m")] = Field(
+        (0.0, 0.0, 0.0), description="Largest offsets along x, y and z, in both directions."
+    )
+    yaw: Annotated[NonNegative, Unit("rad")] = Field(
+        0.0, description="Largest rotation about the vertical, in both directions."
+    )
 
     def apply(self, world: World, random: np.random.Generator) -> None:
         """Moves the body to a random pose."""
@@ -72,9 +84,11 @@ class PoseVariation(ConfigModel):
 class JointVariation(ConfigModel):
     """Random start positions of a robot's driven joints: offsets from the configured positions, within the limits."""
 
-    robot: Name = Field(description="The robot.")
-    offset: Annotated[NonNegative, Unit("rad or m")] = Field(description="Largest offset, either way.")
-    joints: ListOf[Text] = Field((), description="The joints; all that have motors by default.")
+    robot: Name = Field(description="Name of the robot.")
+    offset: Annotated[NonNegative, Unit("rad or m")] = Field(
+        description="Largest offset of a joint position, in both directions."
+    )
+    joints: ListOf[Text] = Field((), description="Names of the joints. By default, all joints with motors.")
 
     def apply(self, world: World, random: np.random.Generator) -> None:
         """Moves the joints to random positions."""
@@ -89,9 +103,11 @@ class JointVariation(ConfigModel):
 class CameraVariation(ConfigModel):
     """Random pose of a camera: offsets from the pose that the camera had when the environment was created."""
 
-    camera: Name = Field(description="The camera.")
-    position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")
-    rotation: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest turn, about a random axis.")
+    camera: Name = Field(description="Name of the camera.")
+    position: Annotated[Vec3, Unit("m")] = Field(
+        (0.0, 0.0, 0.0), description="Largest offsets along x, y and z, in both directions."
+    )
+    rotation: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest rotation, about a random axis.")
 
     def drawn(self, pose: Pose, random: np.random.Generator) -> Pose:
         """Returns a random pose near a given pose."""
@@ -106,8 +122,8 @@ class CameraVariation(ConfigModel):
 class Delays(ConfigModel):
     """Random delays, rounded to ticks; each is drawn uniformly from its range once per episode."""
 
-    observation_s: PositiveRange = Field((0.0, 0.0), description="Age of observations [s].")
-    action_s: PositiveRange = Field((0.0, 0.0), description="Time until an action begins to act [s].")
+    observation_s: PositiveRange = Field((0.0, 0.0), description="Range of the age of observations [s].")
+    action_s: PositiveRange = Field((0.0, 0.0), description="Range of the time until an action takes effect [s].")
 
     def drawn(self, random: np.random.Generator, tick_s: float) -> tuple[int, int]:
         """Draws the delays of observations and of actions [ticks]."""
@@ -118,11 +134,11 @@ class Delays(ConfigModel):
 class Randomization(ConfigModel):
     """Configuration of everything that varies from episode to episode."""
 
-    dynamics: ListOf[DynamicsVariation] = Field((), description="Dynamics of bodies and links.")
-    poses: ListOf[PoseVariation] = Field((), description="Start poses of bodies.")
-    joints: ListOf[JointVariation] = Field((), description="Start positions of joints.")
-    cameras: ListOf[CameraVariation] = Field((), description="Poses of cameras.")
-    delays: Delays = Field(Delays(), description="Delays of observations and actions.")
+    dynamics: ListOf[DynamicsVariation] = Field((), description="Variations of the dynamics of bodies and links.")
+    poses: ListOf[PoseVariation] = Field((), description="Variations of the start poses of bodies.")
+    joints: ListOf[JointVariation] = Field((), description="Variations of the start positions of joints.")
+    cameras: ListOf[CameraVariation] = Field((), description="Variations of the poses of cameras.")
+    delays: Delays = Field(Delays(), description="Random delays of observations and actions.")
 
     @classmethod
     def read(cls, given: str | Mapping[str, Any] | None) -> Randomization:

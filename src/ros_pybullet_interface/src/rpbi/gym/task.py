@@ -22,9 +22,11 @@ from .parts import ObservationPart, Parts, joint_part, sensor_parts
 class WorldTaskConfig(ConfigModel):
     """Options of every task."""
 
-    action_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(40, description="Ticks of the world in an action.")
+    action_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        40, description="Number of ticks of the world for each action."
+    )
     max_actions: Annotated[int, Field(ge=1, le=10_000_000)] = Field(
-        100, description="Actions after which an episode is truncated."
+        100, description="Number of actions after which an episode is truncated."
     )
 
 

@@ -79,10 +79,10 @@ def _of_any_type(schema: Schema) -> Schema:
     """Extends the schema of object files by the required key `type`, and allows further keys for types to define."""
     known = {"type": "string", "enum": list(BODY_TYPES)}
     own = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
-    kind = {"description": "Its class, as `module:Class`, or the name of a type.", "anyOf": [own, known]}
+    kind = {"description": "Class of the object as `module:Class`, or the name of a type.", "anyOf": [own, known]}
     return {
         **schema,
-        "description": "An object whose file names its type, such as one of your own.",
+        "description": "An object whose file names its type, which may be a class of your own.",
         "additionalProperties": True,
         "properties": {TYPE: kind, **schema["properties"]},
         "required": [TYPE, *schema["required"]],
@@ -91,9 +91,9 @@ def _of_any_type(schema: Schema) -> Schema:
 
 def _with_entry(schema: Schema) -> Schema:
     """Extends a schema of a file by the definition of a list entry, which names a file and may override its keys."""
-    path = {"description": "File that has the keys which are not here.", **_FILE_NAME}
+    path = {"description": "File with all keys that this entry does not override.", **_FILE_NAME}
     entry = {
-        "description": "A file, and what is different for this one.",
+        "description": "A file, and keys that override keys of the file.",
         "type": "object",
         "additionalProperties": schema["additionalProperties"],
         "properties": {FILE: path, **{key: {"$ref": f"#/properties/{key}"} for key in schema["properties"]}},

@@ -47,7 +47,9 @@ class OwnControllerConfig(ControllerConfig):
 
     model_config = ConfigDict(json_schema_extra={"additionalProperties": True})
 
-    type: Annotated[Text, WithJsonSchema({"type": "string", "pattern": ":"})] = Field(description="`module:Class`.")
+    type: Annotated[Text, WithJsonSchema({"type": "string", "pattern": ":"})] = Field(
+        description="Class of the controller, as `module:Class`."
+    )
 
 
 _Entry: Any = Union[(*CONTROLLERS.configs().values(), OwnControllerConfig)]  # noqa: UP007 (known at run time only)
@@ -58,10 +60,12 @@ ControllerEntry = Annotated[Any, PlainValidator(controller_config, json_schema_i
 class CoupledJoint(ConfigModel):
     """A mimic joint, as `<mimic>` defines it in a URDF."""
 
-    joint: Text = Field(description="The joint that it follows.")
-    multiplier: float = Field(1.0, description="Its velocity over that of the other.")
+    joint: Text = Field(description="Name of the joint that this joint follows.")
+    multiplier: float = Field(1.0, description="Ratio of this joint's velocity to the followed joint's velocity.")
     offset: float = Field(
-        0.0, description="Its position where the other is at 0.", json_schema_extra={"unit": "rad or m"}
+        0.0,
+        description="Position of this joint when the followed joint is at 0.",
+        json_schema_extra={"unit": "rad or m"},
     )
 
     @field_validator("multiplier")
@@ -80,85 +84,123 @@ class CoupledJoint(ConfigModel):
 class RobotConfig(BodyConfig):
     """A robot, simulated or only shown."""
 
-    loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    loadURDF: LoadURDF = Field(description="URDF file of the robot, and pose of its base.")
     inertia_from_urdf: Switch = Field(
-        True, description="Whether moments of inertia are the URDF's, else PyBullet's guess from the collision shapes."
+        True,
+        description="Whether moments of inertia are taken from the URDF, otherwise computed by PyBullet from the "
+        "collision shapes.",
     )
     is_visual_robot: Switch = Field(
-        False, description="Whether it is only visible: it follows joint targets and TF, without contacts."
+        False, description="Whether the robot is only displayed: it follows joint targets and TF, and has no contacts."
     )
     setJointMotorControlArray: SetJointMotorControlArray | None = Field(
-        None, description="Its motors; required unless it is a visual robot."
+        None, description="Control mode and gains of the motors; required unless `is_visual_robot` is true."
     )
     initial_joint_position: dict[str, float] = Field(
-        {}, description="Start position by joint; those not named start at 0.", json_schema_extra={"unit": "deg or m"}
+        {},
+        description="Start positions, keyed by joint name. All other joints start at 0.",
+        json_schema_extra={"unit": "deg or m"},
     )
     initial_revolute_joint_positions_are_deg: Switch = Field(
-        True, description="Whether start positions of revolute joints are in degrees, else in radians."
+        True, description="Whether start positions of revolute joints are in degrees, otherwise in radians."
     )
     initial_joint_state_topic: str | None = Field(
-        None, description="Joint states, for instance of the real robot, to start at instead."
+        None,
+        description="Topic of joint states, for instance of a real robot. Their positions replace the start "
+        "positions of the same joints. By default, there is no such topic.",
     )
-    initial_joint_state_timeout_s: Seconds = Field(5.0, description="Longest wait for them, of wall time.")
+    initial_joint_state_timeout_s: Seconds = Field(
+        5.0, description="Longest wait for a message on `initial_joint_state_topic`, in wall time."
+    )
     move_to_initial_joint_state_on_startup: Switch = Field(
-        False, description="Accepted without effect: a robot starts there and its motors hold it."
+        False,
+        description="Accepted without effect: joints are at their start positions at once, and motors hold them there.",
     )
-    coupled_joints: dict[str, CoupledJoint] = Field({}, description="Mimic joints by name, beside those of the URDF.")
+    coupled_joints: dict[str, CoupledJoint] = Field(
+        {}, description="Mimic joints in addition to those of the URDF, keyed by joint name."
+    )
     target_timeout_s: Seconds = Field(
-        0.5, description="Age at which velocity and torque targets expire, in the world's time; positions never do."
+        0.5,
+        description="Age at which velocity and torque targets expire, in simulated time; position targets do not "
+        "expire.",
     )
     target_interpolation: Literal["hold", "linear", "smooth"] = Field(
         "smooth",
-        description="Interpolation of a stream of position targets: at once, at constant velocity, or with rounded "
-        "corners.",
+        description="Motion between the position targets of a stream: `hold` jumps to each target, `linear` moves at "
+        "constant velocity, and `smooth` also rounds the corners.",
     )
     target_buffer_s: NonNegative = Field(
         BUFFER_S,
-        description="Delay of position targets of a stream, for late ones; 0 plays targets on arrival.",
+        description="Delay of the position targets of a stream, within which late targets do no harm; 0 applies each "
+        "target on arrival.",
         json_schema_extra={"unit": "s"},
     )
-    enforce_effort_limits: Switch = Field(True, description="Whether motors are held to the efforts of the URDF.")
+    enforce_effort_limits: Switch = Field(
+        True, description="Whether motor efforts are limited to the effort limits in the URDF."
+    )
     gravity_compensation: Switch = Field(
-        False, description="Whether torque targets come on top of the torques that hold the robot against gravity."
+        False, description="Whether torque targets are added to the torques that compensate gravity."
     )
     joint_state_publisher_hz: HzOrOff = Field(50.0, description="Rate of the joint states; 0 is off.")
-    broadcast_link_states: Switch = Field(False, description="Whether the poses of all links are on TF.")
-    broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the links' poses on TF.")
+    broadcast_link_states: Switch = Field(False, description="Whether the poses of all links are published on TF.")
+    broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the link poses on TF.")
     broadcast_root_tf_hz: HzOrOff = Field(
-        0.0, description="Rate of the root link's pose on TF if those of all links are not; 0 is off."
+        0.0, description="Rate of the root link's pose on TF if `broadcast_link_states` is false; 0 is off."
     )
     base_state_hz: HzOrOff | None = Field(
-        None, description="Rate of the state of the base; 0 is off. By default 50 where physics moves it, else off."
+        None,
+        description="Rate of the base's pose and velocity on `base_state`; 0 is off. By default, 50 for a base that "
+        "is not fixed, otherwise 0.",
     )
     planar_base: PlanarBaseConfig | None = Field(
-        None, description="Makes the base drive over the ground by `cmd_vel`, with these limits."
+        None,
+        description="Limits of a base that drives over the ground as commanded on `cmd_vel`. By default, the base "
+        "does not drive.",
     )
     enabled_joint_force_torque_sensors: ListOf[ForceTorqueEntry] = Field(
-        (), description="Joints with a force-torque sensor: names, or mappings with all of its keys."
+        (), description="Force-torque sensors in joints: joint names, or mappings with the keys of a sensor."
     )
     controllers: dict[Name, ControllerEntry] = Field(
-        {}, description="Controllers that live in the tick, by name.", json_schema_extra={"additionalProperties": False}
+        {},
+        description="Controllers that run inside the tick, keyed by controller name.",
+        json_schema_extra={"additionalProperties": False},
     )
-    impedance: JointSprings = Field(JointSprings(), description="Springs and dampers of IMPEDANCE_CONTROL.")
+    impedance: JointSprings = Field(
+        JointSprings(), description="Springs and dampers of the control mode IMPEDANCE_CONTROL."
+    )
     joint_trajectory_controller: JointTrajectoryControllerConfig | None = Field(
-        None, description="Follower of trajectories, for planners; {} has the usual settings."
+        None,
+        description="Follower of joint trajectories; `{}` selects its defaults. By default, the robot does not "
+        "accept trajectories.",
     )
-    object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed or visual base follows.")
-    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
+    object_tf: ObjectTf | None = Field(
+        None, description="TF frame that a fixed or visual base follows. By default, the base does not follow a frame."
+    )
+    resetBaseVelocity: ResetBaseVelocity | None = Field(
+        None, description="Start velocity of a base that is not fixed. By default, the base starts at rest."
+    )
     do_log_joint_limit_violations: Switch = Field(
-        True, description="Whether a visual robot that is beyond its joints' limits is reported."
+        True, description="Whether a warning is logged when a joint of a visual robot exceeds its limits."
     )
     log_joint_limit_violations_hz: Hz = Field(
         50.0, description="Accepted without effect: each violation is logged once."
     )
     start_ik_callback: Switch = Field(
-        False, description="Whether it moves to the solutions of inverse kinematics problems on the topic `ik`."
+        False, description="Whether the robot moves to the solutions of inverse kinematics problems on its topic `ik`."
     )
     strict: Switch = Field(
-        False, description="Whether `ik` refuses targets out of reach; otherwise the link moves as near as possible."
+        False,
+        description="Whether unreachable targets on the topic `ik` are refused; otherwise the link moves as near as "
+        "possible.",
     )
-    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
-    color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
+    contacts: ContactsConfig | None = Field(
+        None,
+        description="Topics with the contacts of the robot; `{}` selects the defaults. By default, contacts are not "
+        "published.",
+    )
+    color_alpha: float | None = Field(
+        None, ge=0.0, le=1.0, description="Opacity of the whole robot, from 0 to 1. By default, as in the URDF."
+    )
 
     @field_validator("setJointMotorControlArray")
     @classmethod

@@ -39,20 +39,26 @@ class CartesianImpedanceConfig(ControllerConfig):
     """Configuration of a `cartesian_impedance` controller."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["cartesian_impedance"]})] = Field(
-        description="`cartesian_impedance`, or a class with its keys."
+        description="`cartesian_impedance`, or a class that accepts the same keys."
     )
 
-    link: Text = Field(description="The link that is held.")
+    link: Text = Field(description="Link that is pulled to the target pose.")
     point: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(
-        (0.0, 0.0, 0.0), description="The point of it that is held, in its frame."
+        (0.0, 0.0, 0.0), description="Controlled point of the link, in the link's frame."
     )
-    stiffness: Annotated[NonNegative, Unit("N/m")] = Field(1000.0, le=5000.0, description="Along each axis.")
+    stiffness: Annotated[NonNegative, Unit("N/m")] = Field(
+        1000.0, le=5000.0, description="Translational stiffness along each axis."
+    )
     rotational_stiffness: Annotated[NonNegative, Unit("N m/rad")] = Field(
-        100.0, le=300.0, description="About each axis."
+        100.0, le=300.0, description="Rotational stiffness about each axis."
     )
-    damping_ratio: DampingRatio = Field(0.7, description="By the critical damping of the arm's inertia at the point.")
+    damping_ratio: DampingRatio = Field(
+        0.7, description="Damping, as a fraction of the critical damping for the arm's inertia at the point."
+    )
     posture_stiffness: Annotated[NonNegative, Unit("N m/rad or N/m")] = Field(
-        20.0, description="With which joints keep to where they were at the start, as far as the point lets them."
+        20.0,
+        description="Stiffness with which joints are pulled to their start positions, as far as the target of the "
+        "point permits.",
     )
 
 

@@ -20,10 +20,12 @@ Array = npt.NDArray[np.float64]
 class ControllerConfig(ConfigModel):
     """Keys that every entry of a robot's `controllers` has; a controller adds its own keys in a subclass."""
 
-    type: Text = Field(description="Its type: a key of CONTROLLERS, or `module:Class`.")
-    active: Switch = Field(True, description="Whether it drives its joints from the start on.")
-    joints: ListOf[Text] | None = Field(None, description="The joints that it drives; all, if they are not named.")
-    state_hz: HzOrOff = Field(50.0, description="Rate of its state; 0 is off.")
+    type: Text = Field(description="Type of the controller: a key of CONTROLLERS, or `module:Class`.")
+    active: Switch = Field(True, description="Whether the controller drives its joints from the start.")
+    joints: ListOf[Text] | None = Field(
+        None, description="Joints that the controller drives. By default, all driven joints of the robot."
+    )
+    state_hz: HzOrOff = Field(50.0, description="Rate of the controller's state topic; 0 is off.")
 
 
 class RobotState(NamedTuple):

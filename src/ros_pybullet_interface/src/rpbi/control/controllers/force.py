@@ -16,11 +16,13 @@ from .controller import Array, ControlledRobot
 class ForceControllerConfig(CartesianImpedanceConfig):
     """Configuration of a `force` controller."""
 
-    type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(description="`force`, or a class with its keys.")
+    type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(
+        description="`force`, or a class that accepts the same keys."
+    )
 
-    axis: Vec3 = Field((0.0, 0.0, -1.0), description="Direction of the force, in the world.")
-    force: Annotated[NonNegative, Unit("N")] = Field(10.0, le=1000.0, description="With what force.")
-    approach_speed: Annotated[Positive, Unit("m/s")] = Field(0.05, description="Speed along the axis without contact.")
+    axis: Vec3 = Field((0.0, 0.0, -1.0), description="Direction of the force in the world frame.")
+    force: Annotated[NonNegative, Unit("N")] = Field(10.0, le=1000.0, description="Magnitude of the contact force.")
+    approach_speed: Annotated[Positive, Unit("m/s")] = Field(0.05, description="Speed along `axis` until contact.")
 
     @field_validator("axis")
     @classmethod

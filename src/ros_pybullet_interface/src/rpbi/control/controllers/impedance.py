@@ -35,10 +35,12 @@ class JointSprings(ConfigModel):
     """Stiffness and damping ratio of springs and dampers at joints."""
 
     stiffness: Annotated[Positive, Unit("N m/rad or N/m")] | dict[str, Positive] = Field(
-        500.0, description="For all joints, or by joint."
+        500.0, description="Stiffness: one number for all joints, or a mapping from joint names to numbers."
     )
     damping_ratio: DampingRatio | dict[str, DampingRatio] = Field(
-        0.7, description="By the critical damping of each joint's inertia: of all joints, or by joint."
+        0.7,
+        description="Damping, as a fraction of the critical damping for each joint's inertia: one number for all "
+        "joints, or a mapping from joint names to numbers.",
     )
 
     def by_joint(self, key: str, joints: Iterable[Joint]) -> Array:

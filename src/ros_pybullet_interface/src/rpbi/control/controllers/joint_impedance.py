@@ -21,7 +21,7 @@ class JointImpedanceConfig(JointSprings, ControllerConfig):
     """Configuration of a `joint_impedance` controller."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["joint_impedance"]})] = Field(
-        description="`joint_impedance`, or a class with its keys."
+        description="`joint_impedance`, or a class that accepts the same keys."
     )
 
 

@@ -16,8 +16,12 @@ SpeedTolerance = Annotated[float, Field(ge=0), Unit("rad/s or m/s")]
 class JointConstraints(ConfigModel):
     """Tolerances of one joint."""
 
-    trajectory: Tolerance = Field(0.0, description="Largest distance from the trajectory on the way; 0 is no limit.")
-    goal: Tolerance = Field(0.0, description="Largest distance from the goal at the end; 0 is no limit.")
+    trajectory: Tolerance = Field(
+        0.0, description="Largest distance of the joint from the trajectory during the motion; 0 is no limit."
+    )
+    goal: Tolerance = Field(
+        0.0, description="Largest distance of the joint from the goal at the end of the motion; 0 is no limit."
+    )
 
 
 class TrajectoryConstraints(ConfigModel):
@@ -26,9 +30,11 @@ class TrajectoryConstraints(ConfigModel):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, JointConstraints]
 
-    goal_time: SecondsOrNone = Field(0.0, description="Longest time after the end to reach the goal.")
+    goal_time: SecondsOrNone = Field(
+        0.0, description="Time after the end of the trajectory within which joints must reach the goal."
+    )
     stopped_velocity_tolerance: SpeedTolerance = Field(
-        0.01, description="Largest speed of a joint that has stopped at its goal; 0 is no limit."
+        0.01, description="Speed below which a joint at its goal counts as stopped; 0 is no limit."
     )
 
     @model_validator(mode="before")
@@ -50,15 +56,17 @@ class JointTrajectoryControllerConfig(ConfigModel):
     """Configuration of a robot's trajectory follower."""
 
     joints: ListOf[Text] | None = Field(
-        None, min_length=1, description="Joints that it drives; without it, all that can be driven."
+        None, min_length=1, description="Joints that the controller drives. By default, all joints that can be driven."
     )
-    constraints: TrajectoryConstraints = Field(TrajectoryConstraints(), description="Tolerances of joints.")
+    constraints: TrajectoryConstraints = Field(TrajectoryConstraints(), description="Tolerances of the joints.")
     stop_trajectory_duration: SecondsOrNone = Field(
-        0.0, description="Duration of the stop when a trajectory is cancelled or aborted; 0 is at once."
+        0.0, description="Time in which joints stop when a trajectory is cancelled or aborted; 0 stops them at once."
     )
     state_publish_rate: Hz = Field(50.0, description="Rate of the state topic.")
-    action_monitor_rate: Hz = Field(20.0, description="Rate of the action's feedback.")
-    allow_partial_joints_goal: Switch = Field(False, description="Whether a trajectory may leave joints out.")
+    action_monitor_rate: Hz = Field(20.0, description="Rate of the action's feedback messages.")
+    allow_partial_joints_goal: Switch = Field(
+        False, description="Whether a trajectory may omit joints of the controller."
+    )
 
 
 def trajectory_problems(

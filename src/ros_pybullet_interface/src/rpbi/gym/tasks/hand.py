@@ -17,11 +17,15 @@ from rpbi.world import World
 class HandConfig(WorldTaskConfig):
     """Options of tasks in which a robot's hand moves within a box-shaped workspace."""
 
-    robot: Name = Field(description="The robot.")
-    link: Text = Field(description="Its hand: the link that actions move.")
-    low: Position = Field(description="Lower corner of the box that hand and objects stay in, in the world.")
-    high: Position = Field(description="Upper corner.")
-    step: PositiveMetres = Field(0.01, description="Largest translation of an action along each axis.")
+    robot: Name = Field(description="Name of the robot.")
+    link: Text = Field(description="Link that actions move, the robot's hand.")
+    low: Position = Field(
+        description="Lower corner of the box that hand and objects must not leave, in the world frame."
+    )
+    high: Position = Field(
+        description="Upper corner of the box that hand and objects must not leave, in the world frame."
+    )
+    step: PositiveMetres = Field(0.01, description="Largest translation of the hand along each axis in one action.")
 
 
 class HandTask(WorldTask):

@@ -19,9 +19,13 @@ from .hand import HandConfig, HandTask
 class LiftConfig(HandConfig):
     """Options of the task `lift`."""
 
-    object: Name = Field(description="The body that is lifted.")
-    fingers: ListOf[Text] = Field(min_length=1, description="Joints of the fingers, which open and close together.")
-    finger_step: PositiveMetres = Field(0.005, description="Largest change of an action.")
+    object: Name = Field(description="Name of the body that is lifted.")
+    fingers: ListOf[Text] = Field(
+        min_length=1, description="Names of the finger joints, which open and close together."
+    )
+    finger_step: PositiveMetres = Field(
+        0.005, description="Largest change of the finger joints' positions in one action."
+    )
     height: PositiveMetres = Field(0.1, description="Height above its start at which the body counts as lifted.")
 
 

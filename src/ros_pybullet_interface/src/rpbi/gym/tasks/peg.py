@@ -21,11 +21,15 @@ from .hand import HandConfig, HandTask
 class PegConfig(HandConfig):
     """Options of the task `peg`."""
 
-    walls: ListOf[Name] = Field(min_length=1, description="Bodies around the hole, which move with it.")
-    hole: Position = Field(description="Middle of the hole's opening, in the world.")
+    walls: ListOf[Name] = Field(
+        min_length=1, description="Names of the bodies around the hole, which move with the hole."
+    )
+    hole: Position = Field(description="Middle of the hole's opening, in the world frame.")
     hole_offset: NonNegativeMetres = Field(0.02, description="Largest random offset of the hole along x and y.")
     half_width: PositiveMetres = Field(description="Half the width of the hole.")
-    depth: PositiveMetres = Field(0.03, description="Depth of the peg's tip in the hole that counts as inserted.")
+    depth: PositiveMetres = Field(
+        0.03, description="Depth of the peg's tip in the hole at which the peg counts as inserted."
+    )
 
 
 class PegTask(HandTask):

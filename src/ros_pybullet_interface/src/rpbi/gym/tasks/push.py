@@ -19,10 +19,16 @@ from .hand import HandConfig, HandTask
 class PushConfig(HandConfig):
     """Options of the task `push`."""
 
-    object: Name = Field(description="The body that is pushed.")
-    goal_low: Position = Field(description="Lower corner of the box in which goals are drawn; its height is not used.")
-    goal_high: Position = Field(description="Upper corner.")
-    tolerance: PositiveMetres = Field(0.03, description="Distance of the body from the goal that counts as reached.")
+    object: Name = Field(description="Name of the body that is pushed.")
+    goal_low: Position = Field(
+        description="Lower corner of the region in which goals are drawn, in the world frame; its z is not used."
+    )
+    goal_high: Position = Field(
+        description="Upper corner of the region in which goals are drawn, in the world frame; its z is not used."
+    )
+    tolerance: PositiveMetres = Field(
+        0.03, description="Distance of the body from the goal below which the goal counts as reached."
+    )
 
 
 class PushTask(HandTask):

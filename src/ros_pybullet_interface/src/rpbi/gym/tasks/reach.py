@@ -20,13 +20,17 @@ from rpbi.world import World
 class ReachConfig(WorldTaskConfig):
     """Options of the task `reach`."""
 
-    robot: Name = Field(description="The robot.")
-    link: Text = Field(description="The link whose frame has to reach the goal.")
-    joints: ListOf[Text] = Field((), description="Joints that move; all that have motors by default.")
-    speed: Annotated[Fraction, Unit("share of the limits")] = Field(0.5, description="Largest speed of joints.")
-    goal_low: Position = Field(description="Lower corner of the box in which goals are drawn, in the world.")
-    goal_high: Position = Field(description="Upper corner.")
-    tolerance: PositiveMetres = Field(0.03, description="Distance that counts as reached.")
+    robot: Name = Field(description="Name of the robot.")
+    link: Text = Field(description="Link whose frame must reach the goal.")
+    joints: ListOf[Text] = Field((), description="Joints that actions move. By default, all joints with motors.")
+    speed: Annotated[Fraction, Unit("share of the limits")] = Field(
+        0.5, description="Largest joint speed in an action."
+    )
+    goal_low: Position = Field(description="Lower corner of the box in which goals are drawn, in the world frame.")
+    goal_high: Position = Field(description="Upper corner of the box in which goals are drawn, in the world frame.")
+    tolerance: PositiveMetres = Field(
+        0.03, description="Distance of the link from the goal below which the goal counts as reached."
+    )
 
 
 class ReachTask(WorldTask):

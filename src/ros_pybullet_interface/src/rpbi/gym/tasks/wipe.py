@@ -22,12 +22,20 @@ TICKS = 40
 class WipeConfig(HandConfig):
     """Options of the task `wipe`."""
 
-    surface: Name = Field(description="The body that is wiped.")
-    spot_low: Position = Field(description="Lower corner of the rectangle that is to be wiped; its height is not used.")
-    spot_high: Position = Field(description="Upper corner.")
-    cells: Annotated[int, Field(ge=1, le=100)] = Field(4, description="Cells of the rectangle along each of its sides.")
-    radius: PositiveMetres = Field(0.03, description="Distance of a cell's middle from the hand that is wiped.")
-    force: Annotated[NonNegative, Unit("N")] = Field(1.0, description="Least normal force that wipes.")
+    surface: Name = Field(description="Name of the body that is wiped.")
+    spot_low: Position = Field(
+        description="Lower corner of the rectangle that must be wiped, in the world frame; its z is not used."
+    )
+    spot_high: Position = Field(
+        description="Upper corner of the rectangle that must be wiped, in the world frame; its z is not used."
+    )
+    cells: Annotated[int, Field(ge=1, le=100)] = Field(
+        4, description="Number of cells along each side of the rectangle."
+    )
+    radius: PositiveMetres = Field(
+        0.03, description="Distance from the hand up to which the middle of a cell counts as wiped."
+    )
+    force: Annotated[NonNegative, Unit("N")] = Field(1.0, description="Least normal force with which the hand wipes.")
 
 
 class WipeTask(HandTask):

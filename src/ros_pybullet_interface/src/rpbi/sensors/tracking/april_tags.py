@@ -41,12 +41,14 @@ SURFACE_M = 0.005
 class TagConfig(ConfigModel):
     """A tag on a body; its frame has x to the right, y up and z towards the viewer."""
 
-    id: Count = Field(description="Number of the tag in its family.")
-    size: PositiveMetres = Field(description="Side of its black square.")
-    body: Name | None = optional("Body that it is on; without it, the one that has the sensor.")
-    link: Text | None = optional("Link that it is on; without it, the root link.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Its centre in the link's frame.")
-    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation there, x, y, z, w.")
+    id: Count = Field(description="Number of the tag in its tag family.")
+    size: PositiveMetres = Field(description="Side of the tag's black square.")
+    body: Name | None = optional("Body that carries the tag. By default, the body with the sensor.")
+    link: Text | None = optional("Link that carries the tag. By default, the root link.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Position of the tag's centre in the link's frame.")
+    orientation: Quat = Field(
+        (0.0, 0.0, 0.0, 1.0), description="Orientation of the tag in the link's frame, x, y, z, w."
+    )
 
     @property
     def pose(self) -> Pose:
@@ -57,15 +59,19 @@ class TagConfig(ConfigModel):
 class AprilTagsConfig(TrackingSensorConfig):
     """A detector of AprilTags: its camera and its tags."""
 
-    camera: Name = Field(description="RGB-D camera of the world; its images need not be drawn.")
-    topic: TopicName = Field("tag_detections", description="Topic of its detections; each detector has another one.")
-    tags: ListOf[TagConfig] = Field(description="The tags that are reported.")
+    camera: Name = Field(
+        description="RGB-D camera of the world that sees the tags; subscribers to its images are not necessary."
+    )
+    topic: TopicName = Field(
+        "tag_detections", description="Topic of the detections; each detector needs its own topic."
+    )
+    tags: ListOf[TagConfig] = Field(description="Tags that are reported.")
     max_angle_deg: Annotated[Degrees, Field(gt=0, lt=90)] = Field(
-        75.0, description="A tag is seen up to this angle between its normal and the line of sight."
+        75.0, description="Largest angle between a tag's normal and the line of sight at which the tag is seen."
     )
     min_side_px: Annotated[float, Field(ge=0)] = Field(
         12.0,
-        description="Shortest side of the black square in the image at which a tag is seen [px].",
+        description="Least side of the black square in the image at which a tag is seen [px].",
     )
 
     @model_validator(mode="after")

@@ -21,8 +21,10 @@ Measured = TypeVar("Measured")
 class OcclusionConfig(ConfigModel):
     """Occlusion at random times."""
 
-    share: Fraction = Field(description="Share of the time for which it is hidden.")
-    length_s: Seconds = Field(0.5, description="Time is divided into parts of this length, each hidden or not.")
+    share: Fraction = Field(description="Fraction of the time during which the object is hidden.")
+    length_s: Seconds = Field(
+        0.5, description="Duration of the time intervals in each of which the object is either hidden or visible."
+    )
 
 
 class TrackingSensorConfig(SensorConfig):
@@ -30,17 +32,18 @@ class TrackingSensorConfig(SensorConfig):
 
     latency_s: Annotated[NonNegative, Unit("s")] = Field(
         0.0,
-        description="Delay of reported poses, in whole samples; their stamps are those of the detections.",
+        description="Delay of messages, rounded up to whole sample periods; their stamps are the times of measurement.",
     )
     noise_m: Annotated[Deviation, Unit("m")] = Field(
         (0.0, 0.0, 0.0),
-        description="Standard deviation of the positions' noise, in the axes of what is reported.",
+        description="Standard deviation of the position noise along the axes of the reported pose, or one number for "
+        "all axes.",
     )
     noise_rad: Annotated[NonNegative, Unit("rad")] = Field(
-        0.0, description="Standard deviation of the rotations' noise about each axis."
+        0.0, description="Standard deviation of the rotation noise about each axis."
     )
-    occlusion: OcclusionConfig | None = optional("When it is hidden by chance; without it, never.")
-    seed: Count | None = optional("Seed of noise and occlusion; without it, one that follows from the names.")
+    occlusion: OcclusionConfig | None = optional("Occlusion at random times. By default, the object is never hidden.")
+    seed: Count | None = optional("Seed of noise and occlusion. By default, computed from the name of the sensor.")
 
     def seed_of(self, name: str) -> int:
         """Returns the configured seed, or by default a seed computed from the sensor's name."""

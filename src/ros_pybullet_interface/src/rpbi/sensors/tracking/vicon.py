@@ -18,7 +18,7 @@ from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 class ViconConfig(TrackingSensorConfig):
     """A Vicon segment (a rigid part with markers) of the body, which is the Vicon subject."""
 
-    link: Text | None = optional("Link that is the segment; without it, the root link.")
+    link: Text | None = optional("Link that is reported as the segment. By default, the root link.")
 
 
 class ViconSensor(BodySensor):
