@@ -120,4 +120,7 @@ def _any_sampler() -> Schema:
         {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}
         for name, schema in SAMPLERS.schemas().items()
     ]
-    return {"description": "Sampler, which draws candidates and computes the plan from their costs.", "anyOf": [*known, own_type]}
+    return {
+        "description": "Sampler, which draws candidates and computes the plan from their costs.",
+        "anyOf": [*known, own_type],
+    }
