@@ -51,7 +51,8 @@ class Device(ABC):
     Attributes:
         Config: Model of the device's options.
         axes: Names of the axes, in the order of `Reading.axes`. Some devices know the axes only after `open`.
-        buttons: Names of the buttons, in the order of `Reading.buttons`. Some devices know them only after `open`.
+        buttons: Names of the buttons, in the order of `Reading.buttons`. Some devices know the buttons only after
+            `open`.
         ros_topics: `module:Class` of a subclass of `DeviceTopics`, which publishes the device's events and subscribes
             to its inputs; empty if the device has no topics other than `sensor_msgs/Joy`.
     """

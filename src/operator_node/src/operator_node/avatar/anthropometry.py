@@ -7,8 +7,8 @@
 - Dempster (1955), as in Winter's table 4.1: densities.
 - Bell, Pedersen and Brand (1990), J. Biomechanics 23(6): position of the hip joints between the iliac spines.
 
-Some parts of the tables cover several segments of `SEGMENTS`. How they are divided among these segments is our own
-choice. Vectors have the components x (forward), y (left) and z (up), for a person in the T-pose.
+Some parts of the tables cover several segments of `SEGMENTS`. How the values are divided among these segments is our
+own choice. Vectors have the components x (forward), y (left) and z (up), for a person in the T-pose.
 """
 
 from typing import NamedTuple

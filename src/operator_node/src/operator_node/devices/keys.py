@@ -227,7 +227,7 @@ class HeldKeys:
             self.release(code)
 
     def drain_events(self) -> tuple[KeyEvent, ...]:
-        """Returns and clears the events since the last call. If a repetition is due, it is the last event."""
+        """Returns and clears the events since the last call. A repetition that is due is the last event."""
         now_s = time.monotonic()
         if now_s >= self._repeat_at_s:
             self._events.append(KeyEvent(self._repeating, self._modifiers(0), True))

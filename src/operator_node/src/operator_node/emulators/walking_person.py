@@ -132,7 +132,7 @@ class WalkingPerson:
         Args:
             number: Index of the stride.
             sign: -1 for the right foot, 1 for the left foot.
-            offset: Delay of the foot's strides, in strides.
+            offset: Time at which the foot's first stride starts, in strides.
         """
         distance_m = self._distance_m((number + offset + STANCE / 2.0) * STRIDE_S)
         angle = distance_m / self._radius_m

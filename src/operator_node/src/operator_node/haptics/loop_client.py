@@ -41,7 +41,7 @@ class LoopClient:
     Attributes:
         report: The newest report.
         ended: Event that is set when the device must not be opened again.
-        failure: Reason why the process is not restarted any more; empty while it is restarted.
+        failure: Reason why the client does not restart the process any more; empty as long as it does.
     """
 
     def __init__(self, setup: Setup, on_report: Callable[[LoopReport], None], arguments: Sequence[str] = ()) -> None:

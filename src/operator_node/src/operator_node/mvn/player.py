@@ -55,7 +55,7 @@ def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Itera
 
     Args:
         path: File of the recording.
-        speed: Factor by which to play the recording faster than it was recorded.
+        speed: Playback speed as a multiple of the recorded speed.
         loop: Whether to repeat the recording without end.
 
     Raises:

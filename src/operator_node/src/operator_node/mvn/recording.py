@@ -17,7 +17,7 @@ _RECORD = struct.Struct(">dH")
 
 
 class Record(NamedTuple):
-    """A datagram, and its arrival relative to the arrival of the first datagram [s]."""
+    """A datagram, and the time from the first datagram's arrival to this datagram's arrival [s]."""
 
     time_s: float
     data: bytes

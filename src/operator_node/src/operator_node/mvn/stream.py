@@ -64,8 +64,8 @@ class StreamDecoder:
         counts: Numbers of datagrams, keyed by result. `received` counts all datagrams. Each datagram is also counted
             as `used`, `late`, `duplicate`, `incomplete` (its message was dropped), `ignored` (type 01 if type 02 is
             sent, too) or `refused: REASON`, unless it waits for the rest of its message. Two further keys are
-            `frames`, the number of returned `SegmentFrame`s, and `skipped`, the number of missing samples between
-            them. Samples are missing if they are lost or late, or if MVN streams at a lower rate than it measures.
+            `frames`, the number of returned `SegmentFrame`s, and `skipped`, the number of missing samples between these
+            frames. Samples are missing if they are lost or late, or if MVN streams at a lower rate than it measures.
         refused: Reasons of the newest refused datagrams, from `packets.REASONS`. The caller may clear this queue.
         refusals: Details of the newest refusal, keyed by reason.
         remarks: Descriptions of unusual data, keyed by subject. The caller may clear this dictionary.

@@ -259,7 +259,7 @@ def bag_to_dataframe(
 
 
 def _named(bag: BagReader, topics: str | Iterable[str] | None) -> list[str] | None:
-    """Returns the topics that match a regular expression, or the topics of a list; None if `topics` is None."""
+    """Returns the topics that match a regular expression, or the listed topics; None if `topics` is None."""
     if topics is None:
         return None
     if not isinstance(topics, str):

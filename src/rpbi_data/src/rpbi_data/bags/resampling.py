@@ -87,8 +87,8 @@ def resample(
 
     Each column is computed from its own samples; rows in which the column is NaN or None are skipped. If several
     samples have the same time, the last one is used. With `previous` and `linear`, a column has no value before its
-    first sample; with `linear`, it also has no value after its last sample. Times are compared as integer nanoseconds,
-    and count as equal if floats cannot distinguish them, which means up to 0.24 us in wall time.
+    first sample; with `linear`, it also has no value after its last sample. Times are compared as integer nanoseconds.
+    Times that floats cannot distinguish count as equal; in wall time, these differ by up to 0.24 us.
 
     Args:
         table: A table with the index `time` [s], ascending.

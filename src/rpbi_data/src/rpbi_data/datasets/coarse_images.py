@@ -136,7 +136,7 @@ def _brightness(images: Array) -> Array:
 
 
 def _order_of_colours(found: Array, exported: Array) -> list[str]:
-    """Returns the exported colours that the frames show as red, green and blue; empty if no colours are swapped."""
+    """Returns which exported colours the frames show as red, green and blue; empty if no colours are swapped."""
     rest = _mean_square(found - exported)
     if rest < MIN_COLOUR_DIFFERENCE:
         return []

@@ -43,10 +43,11 @@ def file_digest(path: Path) -> str:
 
 
 def hash_chain(states: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Returns copies of states with the additional key `link`: the SHA-256 of the previous link and the state.
+    """Returns copies of recorded states with an additional key `link`: the SHA-256 of the previous link and the state.
 
     Args:
-        states: States in the order of recording, with the keys `stamp` [s], `resets`, `tick`, `commands` and `hash`.
+        states: States of the simulator in the order of recording, with the keys `stamp` [s], `resets`, `tick`,
+            `commands` and `hash`.
     """
     chain: list[dict[str, Any]] = []
     link = ""

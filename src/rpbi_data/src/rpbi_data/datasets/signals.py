@@ -265,7 +265,7 @@ def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Co
 
 
 def _frames(tables: Tables, namespace: str) -> dict[str, str]:
-    """Returns table names of the world frame's children, indexed by frame name without prefix, such as `arm/tool`."""
+    """Returns the table name of each child frame of the world frame, indexed by frame without prefix (`arm/tool`)."""
     prefix = f"{namespace.strip('/')}/rpbi/".lstrip("/")
     found = {}
     for table in tables:

@@ -77,7 +77,7 @@ class Compared(NamedTuple):
 
 
 class Comparison:
-    """Compares the messages of an episode with the samples of a replay. Used as a context manager that closes the bag.
+    """Compares the messages of an episode with the sensor samples of a replay. Context manager that closes the bag.
 
     Messages are compared if topic and stamp are the same, and transforms if child frame and stamp are the same.
     Images, messages without a header, and messages whose stamp does not occur in the replay are not compared.
@@ -114,12 +114,12 @@ class Comparison:
         self._bag.__exit__()
 
     def observe(self, world: World, resets: int, samples: Sequence[Any]) -> None:
-        """Compares the samples of one tick of the replay with the recording.
+        """Compares the sensor samples of one tick of the replay with the recording.
 
         Args:
             world: The world of the replay.
             resets: Number of resets between the start of the world and this tick.
-            samples: Samples of the tick.
+            samples: Sensor samples of the tick.
         """
         if self._samples is None or self._stamps is None:
             use_prefix(world.config.tf_prefix)

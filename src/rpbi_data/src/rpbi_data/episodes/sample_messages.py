@@ -1,4 +1,4 @@
-"""Converts a world's samples to the messages that the simulator node publishes, without a ROS master."""
+"""Converts a world's sensor samples to the messages that the simulator node publishes, without a ROS master."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class EpisodeWriter(Protocol):
         """Writes the commands that take effect at the next tick."""
 
     def after_step(self, samples: list[Any]) -> None:
-        """Writes the samples from the tick that has just been simulated."""
+        """Writes the sensor samples of the tick that has just been simulated."""
 
     def end(self) -> None:
         """Writes the final state of the world."""

@@ -32,7 +32,7 @@ CONTACTS, WRENCHES, JOINTS, TF = (
 
 
 def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = False) -> PageScene:
-    """Returns the scene of an episode. The world is built from the files that are stored with the episode.
+    """Returns the page content that shows an episode. The world is built from the files stored with the episode.
 
     Raises:
         EpisodeError: If the folder has no such episode, or the episode has no bag.
@@ -46,7 +46,7 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
 
 
 def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> PageScene:
-    """Returns the scene of a bag with the topic `rpbi/world_description`. The world is built from files on the disk.
+    """Returns the page content that shows a bag with `rpbi/world_description`. The world is built from files on disk.
 
     Raises:
         BagError: If the bag cannot be read, or lacks the topic.

@@ -190,8 +190,8 @@ def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
 def _points(line: pd.Series, count: int) -> dict[str, list[float]]:
     """Returns the points of a line as lists `x` and `y`.
 
-    A line with more than `count` points is divided into `count // 2` intervals, of which only the smallest and the
-    largest value are kept.
+    A line with more than `count` points is divided into `count // 2` intervals. From each interval, only the smallest
+    and the largest value are kept.
     """
     values = line.dropna()
     x, y = values.index.to_numpy(float), values.to_numpy(float)

@@ -124,7 +124,7 @@ class PageScene:
 
     @property
     def all_notes(self) -> list[str]:
-        """The notes, and a message if the scene has fewer times per second than usual."""
+        """The notes, and a message if the scene has fewer times per second than `MAX_HZ`."""
         hz = (len(self.times) - 1) / self.times[-1]
         if hz >= MAX_HZ - 1.0:
             return self.notes

@@ -32,7 +32,7 @@ def send(
     duration_s: Annotated[float, Argument("S", "--for", number)] = 1.0,
     ns: Namespace = None,
 ) -> str:
-    """Sends targets to a robot's joints, a velocity to a mobile robot's base, or applies a force to an object.
+    """Sends targets to a robot's joints or a velocity to a mobile robot's base, or applies a force to an object.
 
     Position targets act at once; `move` reaches positions in a given time.
 

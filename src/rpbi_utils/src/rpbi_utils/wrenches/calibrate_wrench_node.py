@@ -129,7 +129,9 @@ class CalibrateWrenchNode:
         return None if pose is None else gravity_in(pose, self._parameters.gravity)
 
     def _rest(self) -> tuple[Array, Pose | None]:
-        """Waits for `max_samples` wrenches. Returns their mean and the sensor's pose. The caller must hold the lock.
+        """Waits for `max_samples` wrenches. Returns their mean and the sensor's pose; the pose is None if unknown.
+
+        The caller must hold the lock.
 
         Raises:
             MovedError: If the sensor moved, or the wrench changed by more than the limits.

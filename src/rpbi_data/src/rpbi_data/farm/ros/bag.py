@@ -96,7 +96,7 @@ class EpisodeBag:
                         self._write(topic, target)
 
     def after_step(self, samples: list[Any]) -> None:
-        """Writes the samples of the present tick, and the clock, images and state if they are due at this tick."""
+        """Writes the sensor samples of the present tick, and the clock, images and state if due at this tick."""
         tick = self._world.clock.tick
         if self._clock.is_due(tick):
             self._write_clock()
