@@ -1,4 +1,4 @@
-"""`avatar_node.py`: converts a person's segment poses to an avatar's joint targets and TF frame of the base."""
+"""`avatar_node.py`: converts a person's segment poses to an avatar's joint targets and base pose (on TF)."""
 
 import threading
 import time

@@ -91,12 +91,12 @@ class LoopClient:
             self._send(self._command._replace(resets=self._command.resets + 1))
 
     def observe_wrench(self, force: Vector, delay_s: float) -> None:
-        """Sends the force on the tool to the loop, in the tool's axes [N]. Components must be finite."""
+        """Sends the force on the tool, finite and in the tool's axes [N]. `delay_s` is the sample's age [s]."""
         with self._lock:
             self._send(self._command._replace(wrench=LoopInput(force, time.monotonic(), delay_s)))
 
     def observe_tool(self, displacement: Vector, delay_s: float) -> None:
-        """Sends the displacement of the tool from its start to the loop, in the tool's axes [m]."""
+        """Sends the tool's displacement from its start, in the tool's axes [m]. `delay_s` is the sample's age [s]."""
         with self._lock:
             self._send(self._command._replace(tool=LoopInput(displacement, time.monotonic(), delay_s)))
 

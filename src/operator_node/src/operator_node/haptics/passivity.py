@@ -74,7 +74,7 @@ class PassivityController:
         self._held, self._before, self._was_cut = ZERO, ZERO, False
 
     def reset(self) -> None:
-        """Sets a positive energy to zero, but keeps a negative energy. Called when the handle is engaged."""
+        """Sets `energy_j` to zero if positive, but keeps a negative value. Called when the handle is engaged."""
         self.energy_j = min(self.energy_j, 0.0)
 
     def observe(self, displacement: Vector) -> None:

@@ -90,11 +90,11 @@ class OperatorNode(ABC):
         """
 
     def start(self) -> tuple[bool, str]:
-        """Switches the node on. Returns whether the node was off before, and a message."""
+        """Switches the node on. Returns whether the node was off before, and a message for the user."""
         return self._toggle.on()
 
     def stop(self) -> tuple[bool, str]:
-        """Switches the node off. Returns whether the node was on before, and a message."""
+        """Switches the node off. Returns whether the node was on before, and a message for the user."""
         return self._toggle.off()
 
     def publish(self, signal: ArrayLike) -> None:

@@ -258,7 +258,7 @@ def stored_names(files: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, 
 
 
 def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], store: Path, folder: Path) -> str:
-    """Writes the stored files into a folder, and returns a world's description that names these files.
+    """Writes the stored files into a folder, and returns a world's description that refers to the written files.
 
     Args:
         description: The world's description as JSON, as on the topic `rpbi/world_description`.

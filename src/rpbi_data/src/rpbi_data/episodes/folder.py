@@ -238,7 +238,7 @@ class EpisodeFolder:
         return self.folder_of(number).rename(target)
 
     def relabel(self, number: int, label: str) -> Episode:
-        """Changes the label of an episode, and returns the episode.
+        """Changes the label of an episode, and returns the changed `Episode`.
 
         Raises:
             EpisodeError: If the episode does not exist.

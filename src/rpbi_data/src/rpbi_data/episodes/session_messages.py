@@ -99,15 +99,15 @@ def recorded_episode(
 ) -> Iterator[tuple[Path, Recording]]:
     """Context manager that yields the bag of an episode, and the session in the bag.
 
-    The description of the session's world names copies of files in a temporary folder, which exists until the end of
-    the context.
+    In this session, the world's description refers to copies of files in a temporary folder, which exists until the end
+    of the context.
 
     Args:
         folder: The folder of episodes.
         episode: The episode.
         any_size: See `read_recording`.
         is_replayed: Whether the session will be simulated again. If so, the bag must contain state hashes, and
-            keyframes are changed to name the copies, too.
+            keyframes are changed to refer to the copies, too.
 
     Raises:
         EpisodeError: If the episode has no bag, or a stored file cannot be read.

@@ -44,7 +44,7 @@ class Poses(NamedTuple):
         return cls(numbers[:, :3], Rotation.from_quat(numbers[:, 3:]))
 
     def __matmul__(self, other: Poses) -> Poses:
-        """Composes these poses with poses that are relative to this frame, at each of the n times."""
+        """Converts poses `other`, relative to this frame, to poses relative to this frame's reference, at each time."""
         return Poses(self.position + self.rotation.apply(other.position), self.rotation * other.rotation)
 
 
