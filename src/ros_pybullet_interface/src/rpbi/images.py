@@ -28,7 +28,7 @@ STREAMS = ("colour", "depth", "segmentation")
 TRIES = 3
 """Number of timed images per camera, after one image that also loads the scene."""
 LONGEST_S = 60.0
-"""Longest wall time of the measurement of drawing times [s]."""
+"""Longest wall time [s] of the measurement of drawing times."""
 
 
 class CameraImages:

@@ -66,7 +66,7 @@ class BodyState(NamedTuple):
         name: Name of the body.
         base: Position [m] and quaternion x, y, z, w of the base's inertial frame, as in PyBullet.
         joints: Positions of all joints [rad or m] in index order; for a ball joint a quaternion x, y, z, w.
-        nodes: Positions of the simulated mesh nodes of a soft body [m]; empty for a rigid body.
+        nodes: Positions [m] of the simulated mesh nodes of a soft body; empty for a rigid body.
     """
 
     name: str
@@ -100,7 +100,7 @@ class WrenchSample(NamedTuple):
         name: `ROBOT/JOINT`.
         frame_id: TF frame of the joint's child link. Force and torque are in the axes of this frame.
         force: Force [N].
-        torque: Moment about the origin of the frame [N m], where the joint is.
+        torque: Moment [N m] about the origin of the frame, where the joint is.
     """
 
     name: str
@@ -119,7 +119,7 @@ class ContactPoint(NamedTuple):
         link: Link of the body.
         other_body: Name of the other body; name of the body itself if two of its links touch.
         other_link: Link of the other body.
-        position: Position of the contact on the surface of the body [m].
+        position: Position [m] of the contact on the surface of the body.
         normal: Contact normal, a unit vector from the other body towards the body.
         depth: Penetration depth [m]; negative if a contact force acts across a gap.
         normal_force: Force along the normal [N], not negative.
@@ -139,7 +139,7 @@ class ContactPoint(NamedTuple):
 
     @property
     def force(self) -> Vector:
-        """Total force of the contact on the body [N]: normal force plus friction."""
+        """Total force [N] of the contact on the body: normal force plus friction."""
         first, second = map(scaled, self.friction_forces, self.friction_directions)
         return plus(scaled(self.normal_force, self.normal), plus(first, second))
 
@@ -179,7 +179,7 @@ class ContactsSample:
 
     @property
     def force(self) -> Vector:
-        """Sum of the contact forces that other bodies exert on the body [N]."""
+        """Sum [N] of the contact forces that other bodies exert on the body."""
         total = (0.0, 0.0, 0.0)
         for point in self.points:
             if point.other_body != self.name:

@@ -35,8 +35,8 @@ class MouseEvent(NamedTuple):
 
     Attributes:
         kind: 1 if the mouse moved, 2 if a button changed.
-        x: Distance of the pointer from the left edge of the window [px].
-        y: Distance of the pointer from the top edge of the window [px].
+        x: Distance [px] of the pointer from the left edge of the window.
+        y: Distance [px] of the pointer from the top edge of the window.
         button: 0 for left, 1 for middle, 2 for right; -1 if the mouse moved.
         state: State of the button, as in `WindowKeyEvent`; 0 if the mouse moved.
     """
@@ -94,7 +94,7 @@ class Window:
         self._pb.resetDebugVisualizerCamera(**camera.kwargs())
 
     def seconds_per_call(self) -> float:
-        """Measures the mean duration of a PyBullet call [s], including the wait for the frame that the window draws."""
+        """Measures the mean duration [s] of a PyBullet call, including the wait for the frame that the window draws."""
         begin_s = time.monotonic()
         for _ in range(MEASURED_CALLS):
             self._pb.getPhysicsEngineParameters()

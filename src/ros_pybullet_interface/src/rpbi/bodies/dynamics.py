@@ -21,7 +21,7 @@ class LinkDynamics(NamedTuple):
         mass: Mass [kg], 0 for static bodies.
         lateral_friction: Coulomb friction coefficient.
         local_inertia_diagonal: Principal moments of inertia [kg m^2].
-        local_inertia_pos: Centre of mass in the link's frame [m].
+        local_inertia_pos: Centre of mass [m] in the link's frame.
         local_inertia_orn: Orientation of the principal axes in the link's frame, quaternion x, y, z, w.
         restitution: Coefficient of restitution.
         rolling_friction: Coefficient of rolling friction.

@@ -18,7 +18,7 @@ from .shape_object import ShapeObject
 
 PLANE_SIZE_M = 40.0
 PLANE_THICKNESS_M = 0.001
-"""Thickness of the box that shows an infinite plane [m]; the top of the box is the plane."""
+"""Thickness [m] of the box that shows an infinite plane; the top of the box is the plane."""
 
 
 class ShapeKind(enum.Enum):
@@ -120,7 +120,7 @@ def _cube(edge_m: float) -> Vector:
 def turned_to(normal: Vector) -> Quaternion:
     """Returns the quaternion of the shortest rotation that turns the z axis to a given direction.
 
-    Before normalisation, the quaternion's vector part is the cross product of both directions, and w is
+    Before normalisation, the quaternion's vector part is the cross product of z axis and direction, and w is
     `1 + cos(angle)`.
     """
     length = math.hypot(*normal)

@@ -15,7 +15,7 @@ from rpbi.geometry import LinkWrench, Pose, rotated
 from rpbi.plain_values import as_tuple
 
 TIMEOUT_S = 0.5
-"""Time for which a wrench received on a topic acts [s] of the world's time, unless a newer wrench replaces it."""
+"""Duration [s], in the world's time, for which a wrench received on a topic acts, unless a newer wrench replaces it."""
 
 
 class ExternalWrench(NamedTuple):

@@ -12,13 +12,13 @@ from .sender_clock import DRIFT, Arrival, SenderClock
 BUFFER_S = 0.02
 """Default buffer delay [s]. A target that arrives late by less than the delay is still played on time."""
 LONGEST_PERIOD_S = 0.2
-"""Longest interval between the targets of a stream [s]. Targets with longer intervals act at once."""
+"""Longest interval [s] between the targets of a stream. Targets with longer intervals act at once."""
 EVERY_TICK = 1.5
 """Largest interval [ticks] of targets that come at every tick. These targets act at once, too."""
 WINDOW = 64
 """Number of arrivals from which period, rate and delay are estimated."""
 SETTLING_S = 0.8
-"""Time constant with which the delay changes [s]; shorter for the first targets of a stream."""
+"""Time constant [s] with which the delay changes; shorter for the first targets of a stream."""
 SHORTEST = 0.8
 """Smallest ratio of the interval with which two targets are played to the interval with which they were sent."""
 REPLACED = 0.25
@@ -26,7 +26,7 @@ REPLACED = 0.25
 MIN_MISFIT_RATIO = 2.0
 """Ratio of accumulated squared misfits above which a regular period replaces the stamps, or the reverse."""
 MIN_MISFIT = 1e-10
-"""Difference of squared misfits below which both kinds of send times count as equal [rad^2 or m^2]."""
+"""Difference of squared misfits [rad^2 or m^2] below which both kinds of send times count as equal."""
 MIN_LOSS_RATIO = 16.0
 """Ratio of squared misfits above which a gap is explained by lost targets rather than by a late target."""
 MAX_LOST = 4
@@ -36,22 +36,22 @@ PERSISTENT = 16
 SAME_PERIOD = (0.6, 1.6)
 """Range of the mean of the last `PERSISTENT` intervals for which the period counts as unchanged [periods]."""
 SHORTEST_WAY = 0.05
-"""Smallest interval with which two targets are played [ticks]."""
+"""Smallest interval [ticks] with which two targets are played."""
 LEAST_AHEAD = 0.25
-"""Smallest delay between arrival and playing of a target [ticks]."""
+"""Smallest delay [ticks] between arrival and playing of a target."""
 
 
 class Playout(NamedTuple):
     """Schedule of one target; times are in ticks of the world.
 
     Attributes:
-        start: Time at which set points leave the previous target [ticks].
-        end: Time at which set points reach this target [ticks].
+        start: Time [ticks] at which set points leave the previous target.
+        end: Time [ticks] at which set points reach this target.
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
         speed: Interval between sending the previous target and this one, divided by the interval between playing both.
-        pace: Mean interval between the arrivals of recent targets [ticks].
-        gap: Time from the end of extrapolation to this target's arrival [ticks]; 0 if the target came before that end.
-        apart: Interval from the previous target to this one, by stamps or arrivals [ticks]; 0 if unknown.
+        pace: Mean interval [ticks] between the arrivals of recent targets.
+        gap: Time [ticks] from the end of extrapolation to this target's arrival; 0 if the target came before that end.
+        apart: Interval [ticks] from the previous target to this one, by stamps or arrivals; 0 if unknown.
     """
 
     start: float
@@ -72,18 +72,18 @@ class JitterBuffer:
     """Delays the targets of a stream such that they are played at the intervals at which they were sampled.
 
     Send times are estimated in two ways. The first estimate, for samples at irregular intervals, equals the stamps, or
-    the arrivals if stamps are not valid. The second estimate, for regular samples that a busy machine sends late, is a
-    regular period fitted to the first estimate. The buffer uses the estimate for which positions change more smoothly
-    over time.
+    the arrivals if stamps are not valid. The second estimate, for regular samples that a busy machine sends late,
+    consists of equally spaced times that are fitted to the first estimate. The buffer uses the estimate for which
+    positions change more smoothly over time.
 
     Transport delays are never negative, so the recent target with the smallest delay counts as undelayed. A target is
-    played the buffer delay, plus a period of the stream, after the time at which it would have come undelayed. The
+    played at the time at which it would have come undelayed, plus the buffer delay and one period of the stream. The
     offset from send times to play times changes slowly, except if a target comes too late for the present offset.
 
     Args:
         dt_s: Length of a tick [s].
         buffer_s: Buffer delay [s], including one and a half ticks for the wait until the next tick. A target that
-            arrives late by less than the delay is still played on time. 0 plays targets as they come.
+            arrives late by less than the buffer delay is still played on time. 0 plays targets as they come.
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
@@ -91,13 +91,13 @@ class JitterBuffer:
         self._buffer = max(buffer_s / dt_s - 1.5, 0.0)
         self._settling = SETTLING_S / dt_s
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
-        """Time for which set points continue at their last velocity if the next target is late [ticks]."""
+        """Time [ticks] for which set points continue at their last velocity if the next target is late."""
         self._longest = LONGEST_PERIOD_S / dt_s
         self._sender = SenderClock(dt_s)
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
         self._start = self._end = 0.0
         self._pace = 0.0
-        """Mean interval between arrivals [ticks]; 0 if all targets came before the same tick."""
+        """Mean interval [ticks] between arrivals; 0 if all targets came before the same tick."""
         self._restart()
 
     def _restart(self) -> None:
@@ -115,7 +115,7 @@ class JitterBuffer:
 
         Args:
             tick: Number of the first tick after the target came.
-            stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+            stamp_ns: Time [ns] of sending by the sender's clock; 0 if unknown.
             goal: Target positions [rad or m], keyed by joint index.
         """
         if self._seen and self._is_apart(tick, stamp_ns):
@@ -149,7 +149,7 @@ class JitterBuffer:
         return playout._replace(apart=times[-1] - times[-2])
 
     def _is_apart(self, tick: int, stamp_ns: int) -> bool:
-        """Returns whether arrivals or valid stamps of the last two targets are too far apart for a stream."""
+        """Returns whether the last two targets are too far apart for one stream, by arrivals or by valid stamps."""
         last = self._seen[-1]
         sent_ticks = self._sender.ticks_between(last.stamp_ns, stamp_ns) if self._sender.is_right else 0.0
         return max(tick - last.tick, sent_ticks) > self._longest
@@ -168,10 +168,10 @@ class JitterBuffer:
         return Playout(self._start, self._end, 2.0 * EVERY_TICK, pace=self._pace)
 
     def _least_way(self, tick: int) -> float:
-        """Returns the minimum interval between playing the previous target and playing the newest one [ticks].
+        """Returns the minimum interval [ticks] between playing the previous target and playing the newest one.
 
-        While earlier targets are still to be played, the interval is 0.4 of the mean interval or longer. This limits
-        the speed of a burst.
+        While earlier targets are still to be played, this minimum is at least 0.4 times the mean interval between
+        arrivals. This limits the speed at which a burst of targets is played.
         """
         return max(SHORTEST * self._pace / 2.0, SHORTEST_WAY) if self._end - tick > EVERY_TICK else SHORTEST_WAY
 
@@ -180,8 +180,8 @@ class JitterBuffer:
 
         Args:
             tick: Number of the first tick after the target came.
-            planned: Time at which the target should be played according to the present estimates [ticks].
-            interval: Estimated interval since the previous target was sent [ticks].
+            planned: Time [ticks] at which the target should be played according to the present estimates.
+            interval: Estimated interval [ticks] since the previous target was sent.
             period: Estimated period of the stream [ticks].
         """
         before = self._end
@@ -204,7 +204,7 @@ class JitterBuffer:
         return Playout(before, end, period, interval / (end - before), self._pace, gap)
 
     def _undelayed(self, times: Sequence[float], steps: Sequence[int], regular: bool) -> float:
-        """Estimates when the newest target would have come without delay, relative to its arrival [ticks].
+        """Estimates the time [ticks], relative to its arrival, at which the newest target would have come undelayed.
 
         The smallest delay of the recent targets is slightly above zero. The estimate corrects this under the assumption
         that delays are distributed uniformly.
@@ -238,7 +238,7 @@ class JitterBuffer:
             self._rate += share * (min(max(rate, 1.0 - DRIFT), 1.0 + DRIFT) - self._rate)
 
     def _is_out_of_step(self, times: Sequence[float]) -> bool:
-        """Returns whether the period has changed, or the delay has grown permanently."""
+        """Returns whether the stream's period has changed, or the transport delay has grown permanently."""
         if self._out_of_step >= PERSISTENT:
             return True
         lowest, highest = SAME_PERIOD
@@ -268,7 +268,10 @@ class JitterBuffer:
             self._seen[-1] = last[-1]._replace(step=periods)
 
     def _compare(self, times: Sequence[float], steps: Sequence[int]) -> None:
-        """Chooses stamps (or arrivals) or a regular period as send times, by the smoothness of positions over time."""
+        """Decides whether stamps (or arrivals) or equally spaced times are used as send times.
+
+        The send times over which positions change more smoothly are used.
+        """
         last = list(self._seen)[-4:]
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)
         if not all(map(math.isfinite, new)):
@@ -283,7 +286,7 @@ class JitterBuffer:
 
 
 def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Returns the slope of the line below all points that has the smallest mean distance to the points.
+    """Returns a line's slope: of all lines below all points, the line with the smallest mean distance to the points.
 
     This line is the best estimate if delays are never negative (Moon, Skelly, Towsley: Estimation and removal of clock
     skew from network delay measurements, INFOCOM 1999). The line contains the edge of the lower convex hull at the mean

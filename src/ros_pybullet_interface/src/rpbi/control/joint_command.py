@@ -24,7 +24,7 @@ class JointCommand(NamedTuple):
         position: n positions [rad or m], or empty.
         velocity: n velocities [rad/s or m/s], or empty.
         effort: n torques or forces [N m or N], or empty.
-        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+        stamp_ns: Time [ns] of sending by the sender's clock; 0 if unknown.
     """
 
     names: Sequence[str]

@@ -59,7 +59,7 @@ class Motion(ABC):
         """Computes the set points for one tick. An implementation calls `end` when the motion is complete or fails.
 
         Args:
-            time_s: The world's time at the end of the tick [s].
+            time_s: The world's time [s] at the end of the tick.
             measured: Measured state of all driven joints at the beginning of the tick.
 
         Returns:

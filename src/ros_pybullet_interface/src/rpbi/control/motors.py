@@ -19,13 +19,13 @@ from .joint_command import JointCommand
 log = logging.getLogger(__name__)
 
 PERIOD_S = 5.0
-"""Shortest interval between two warnings about the same joint [s] of wall time."""
+"""Shortest interval [s], in wall time, between two warnings about the same joint."""
 
 
 class LimitReports:
-    """Logs a warning when a joint leaves its position limits, at most one per joint within `PERIOD_S`.
+    """Logs a warning if a joint leaves its position limits, at most one warning per joint within `PERIOD_S`.
 
-    There is no further warning until the joint has been within its limits again.
+    The next warning about a joint requires that the joint has been within its limits again.
     """
 
     not_in_keyframes = ("_beyond", "_reported_s")
@@ -78,7 +78,7 @@ class ResolvedCommand(NamedTuple):
         mode: The control mode.
         values: Positions, velocities or efforts, keyed by joint index.
         velocities: For position targets: velocities at the target positions, keyed by joint index; may be empty.
-        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+        stamp_ns: Time [ns] of sending by the sender's clock; 0 if unknown.
     """
 
     mode: int
@@ -129,7 +129,7 @@ class Motors:
         gains: PyBullet's `positionGain` and `velocityGain`, keyed by joint index. Defaults are PyBullet's.
         limit_reports: Logs position targets beyond the joints' limits.
         enforce_effort_limits: Whether efforts are clipped to the URDF's effort limits.
-        timeout_s: Age at which velocity and effort targets expire, in the world's time [s].
+        timeout_s: Age [s] at which velocity and effort targets expire, in the world's time.
 
     Attributes:
         targets: Set points of the motors, keyed by joint index. The control mode decides whether these are positions,
@@ -265,8 +265,8 @@ class Motors:
 
         Args:
             index: Joint index.
-            position: Desired position before the tick [rad or m].
-            velocity: Velocity that leads to the desired position after the tick [rad/s or m/s].
+            position: Desired position [rad or m] before the tick.
+            velocity: Velocity [rad/s or m/s] that leads to the desired position after the tick.
         """
         if self.mode == IMPEDANCE_CONTROL:
             self.impedance_setpoints[index] = position, velocity
@@ -277,7 +277,7 @@ class Motors:
             self.targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
-        """Ends `track` for joints, given by index; the joints' targets for the control mode drive the motors again.
+        """Ends `track` for some joints; their motors then follow the control mode's targets again.
 
         In position modes the joints hold the last tracked position. Under velocity control they stand still.
         """
@@ -311,7 +311,7 @@ class Motors:
         self.reset_setpoints(states)
 
     def disable(self, indices: Iterable[int]) -> None:
-        """Switches off PyBullet's motors of joints, given by index, so that `apply_efforts` can drive these joints."""
+        """Switches off the PyBullet motors of joints, so that `apply_efforts` can drive the joints."""
         for index in indices:
             self._expiry.pop(index, None)
             self._renewed.discard(index)
@@ -334,7 +334,7 @@ class Motors:
 
     @property
     def is_idle(self) -> bool:
-        """Whether `before_step` has nothing to do: no target expires, and no efforts are applied at each tick."""
+        """Whether `before_step` has nothing to do, because no target expires and no efforts are applied each tick."""
         keeps = self.mode in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL)
         return keeps and not self._renewed and not self._expiry
 

@@ -21,7 +21,7 @@ from rpbi.plain_values import as_tuple
 PLANAR_JOINTS = (0, 1, 2)
 """PyBullet's indices of the joints along x, along y and about z, and also of these joints' child links."""
 ROUNDING = 1e-6
-"""Largest velocity component out of the plane that is accepted as zero [m/s, rad/s]."""
+"""Largest velocity component [m/s, rad/s] out of the plane that is accepted as zero."""
 
 
 class PlanarVelocity(NamedTuple):
@@ -106,11 +106,11 @@ class PlanarBaseConfig(ConfigModel):
 
 
 GRAVITY = 9.81
-"""Gravity from which default force limits are computed [m/s^2], independent of the world's gravity."""
+"""Gravity [m/s^2] from which default force limits are computed, independent of the world's gravity."""
 POSITION_GAIN = 0.1
 """Share of the position error between set point and base that the motors correct in a tick."""
 CATCH_UP_SPEED = (0.5, 0.5, 1.0)
-"""Largest additional speed along x, y and about z to correct position errors [m/s, m/s, rad/s].
+"""Largest additional speed [m/s, m/s, rad/s] along x, y and about z to correct position errors.
 
 A larger error means that an obstacle blocks the base. The set point is then moved towards the base.
 """

@@ -26,10 +26,10 @@ JUMP_S = 0.1
 If two periods of the stream are longer, two periods count instead.
 """
 QUIET_S = 5.0
-"""Shortest interval between two warnings about jumps [s] of the world's time."""
+"""Shortest interval [s], in the world's time, between two warnings about jumps."""
 
 MAX_TICKS = 10_000
-"""Largest length of the moving average [ticks]."""
+"""Largest length [ticks] of the moving average."""
 
 _Numbers = npt.NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class PosePath:
 
     @property
     def period(self) -> int:
-        """Longest recent interval between poses [ticks]."""
+        """Longest recent interval [ticks] between poses."""
         return max(self._intervals)
 
     def ticks_to(self, pose: Pose) -> float:
@@ -235,7 +235,7 @@ class TrackedBase(PoseFollower):
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Drops path and goal after the body was set to a pose; physics moves the body until the next pose comes."""
+        """Drops path and goal after other code has set the body's pose; physics moves the body until a pose comes."""
         self._path = self._waiting = None
 
     def before_step(self, tick: int) -> None:

@@ -56,7 +56,7 @@ class RobotDynamics:
         self._turn = np.eye(3)
 
     def mass_matrix(self, q: Sequence[float]) -> Array:
-        """Returns the mass matrix at n joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
+        """Returns the mass matrix [kg m^2, kg m, kg], shape (n, n), at n joint positions [rad or m]."""
         pb = self._client or self._load()
         mass = np.array(pb.calculateMassMatrix(self._body_id, self._positions(q)))
         return mass if self._by_driven is None else self._by_driven.factors.T @ mass @ self._by_driven.factors
@@ -136,7 +136,10 @@ class RobotDynamics:
             self._client = None
 
     def _positions(self, q: Sequence[float]) -> Sequence[float]:
-        """Returns the positions of all joints with one axis, including coupled joints, for n driven positions."""
+        """Returns the positions of all joints with one axis, including coupled joints.
+
+        The result is computed from the positions `q` of the n driven joints.
+        """
         if self._by_driven is None:
             return q
         positions: list[float] = (self._by_driven.factors @ q + self._by_driven.offsets).tolist()

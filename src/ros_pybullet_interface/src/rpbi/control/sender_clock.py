@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 MAX_OFFSET_S = 0.1
-"""Largest difference between the window's durations by stamps and by arrivals [s], in addition to `DRIFT`."""
+"""Largest difference [s] between the window's durations by stamps and by arrivals, in addition to `DRIFT`."""
 DRIFT = 0.1
 """Largest relative difference between the rate of stamps and the rate of the world's time."""
 STALL_S = 1.0
-"""Longest stall of world or sender [s] after which the stamps of targets that arrive in a burst are still used."""
+"""Longest stall [s] of world or sender after which the stamps of targets that arrive in a burst are still used."""
 
 
 class Arrival(NamedTuple):
@@ -19,9 +19,9 @@ class Arrival(NamedTuple):
 
     Attributes:
         tick: Number of the first tick after the target came.
-        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+        stamp_ns: Time [ns] of sending by the sender's clock; 0 if unknown.
         goal: Target positions [rad or m], keyed by joint index.
-        step: Number of periods since the previous target.
+        step: Number of periods of the stream since the previous target.
     """
 
     tick: int
@@ -38,7 +38,7 @@ class SenderClock:
 
     Attributes:
         is_right: Whether stamps run as fast as the world's time; None if unknown. After a deviation, the value is False
-            until the stamps of a full window agree with the world's time again.
+            until all stamps in a full window of recent targets agree with the world's time again.
     """
 
     def __init__(self, dt_s: float) -> None:
@@ -46,20 +46,20 @@ class SenderClock:
         self._max_offset = MAX_OFFSET_S / dt_s
         self.is_right: bool | None = None
         self._in_step_ns = 0
-        """Newest stamp of the last full window whose stamps ran as fast as the world's time [ns]."""
+        """Newest stamp [ns] of the last full window whose stamps ran as fast as the world's time."""
 
     def restart(self) -> None:
         """Allows the use of stamps again, for a new stream."""
         self.is_right = self.is_right or None
 
     def ticks_between(self, first_ns: int, last_ns: int) -> float:
-        """Returns the time between two stamps [ticks]."""
+        """Returns the time [ticks] between two stamps."""
         return (last_ns - first_ns) / self._dt_ns
 
     def times(self, seen: deque[Arrival]) -> tuple[list[float], bool]:
         """Returns the estimated send times of targets, and whether these times come from stamps.
 
-        Times are relative to the newest target [ticks], so they are 0 or negative. Without usable stamps, they are the
+        Times [ticks] are relative to the newest target, so they are 0 or negative. Without usable stamps, they are the
         times of arrival.
 
         Args:
@@ -72,7 +72,11 @@ class SenderClock:
         return (stamps, True) if rises and self._uses(stamps, arrivals, seen) else (arrivals, False)
 
     def _uses(self, stamps: Sequence[float], arrivals: Sequence[float], seen: deque[Arrival]) -> bool:
-        """Returns whether stamps are used: they agree with the world's time, or a stall explains the deviation."""
+        """Returns whether the targets' stamps can be used as send times.
+
+        This is so if the stamps agree with the world's time, or if a stall of the world or the sender explains why they
+        do not.
+        """
         is_full = len(seen) == seen.maxlen
         is_in_step = abs(stamps[0] - arrivals[0]) <= self._max_offset - DRIFT * arrivals[0]
         if is_in_step and (is_full or self.is_right is not False):
@@ -86,10 +90,11 @@ class SenderClock:
     def _may_have_waited(self, first_ns: int, last_ns: int) -> bool:
         """Returns whether a stall of the world or the sender explains why stamps and arrivals disagree.
 
-        A stall is accepted as the explanation until the targets that came after it have left the window.
+        A stall is accepted as the explanation until the targets that came after it have left the window of recent
+        targets.
 
         Args:
-            first_ns: Oldest stamp in the window [ns].
-            last_ns: Newest stamp in the window [ns].
+            first_ns: Oldest stamp [ns] in the window.
+            last_ns: Newest stamp [ns] in the window.
         """
         return 0 < last_ns - self._in_step_ns <= last_ns - first_ns + STALL_S * 1e9

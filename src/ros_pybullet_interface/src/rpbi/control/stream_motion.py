@@ -11,7 +11,7 @@ from .jitter_buffer import EVERY_TICK, LONGEST_PERIOD_S, SHORTEST, WINDOW
 from .sender_clock import STALL_S
 
 BRAKE_S = 0.15
-"""Time in which a motion comes to a stop if targets are late [s]."""
+"""Time [s] in which a motion comes to a stop if targets are late."""
 HEADROOM = 1.5
 """Ratio of the set points' largest acceleration to the targets' largest acceleration."""
 LAST = 6
@@ -28,9 +28,9 @@ class StreamSegment(NamedTuple):
     Attributes:
         start: Start time [ticks].
         length: Duration [ticks].
-        goal: Positions at the end of the segment [rad or m], keyed by joint index.
-        way: Displacements from start to end [rad or m], keyed by joint index.
-        slopes: Velocities at start and end [rad or m per tick], keyed by joint index; None for a line.
+        goal: Positions [rad or m] at the end of the segment, keyed by joint index.
+        way: Displacements [rad or m] from start to end, keyed by joint index.
+        slopes: Velocities [rad or m per tick] at start and end, keyed by joint index; None for a line.
         is_beyond: Whether the segment extrapolates beyond the last target because the next target is late.
     """
 
@@ -43,11 +43,11 @@ class StreamSegment(NamedTuple):
 
     @property
     def end(self) -> float:
-        """End time of the segment [ticks]."""
+        """End time [ticks] of the segment."""
         return self.start + self.length
 
     def cut(self, tick: float) -> StreamSegment:
-        """Returns the part of the segment before a time [ticks]; length 0 if the time is before the segment's start."""
+        """Returns the part of the segment before a time [ticks]; its length is 0 if the time is before the segment."""
         length = max(tick - self.start, 0.0)
         basis = _hermite(length / self.length)
         way = {index: self.covered(index, basis) for index in self.way}
@@ -56,7 +56,7 @@ class StreamSegment(NamedTuple):
         return self._replace(length=length, goal=goal, way=way, slopes=slopes)
 
     def covered(self, index: int, basis: tuple[float, float, float]) -> float:
-        """Returns the displacement of a joint from the segment's start [rad or m].
+        """Returns the displacement [rad or m] of a joint from the segment's start.
 
         Args:
             index: Joint index.
@@ -82,7 +82,7 @@ class StreamSegment(NamedTuple):
         return (after[0] - before[0]) / width, (after[1] - before[1]) / width, (after[2] - before[2]) / width
 
     def velocity(self, tick: float) -> Mapping[int, float]:
-        """Returns velocities at a time [rad or m per tick], keyed by joint index.
+        """Returns the velocities [rad or m per tick] at a time, keyed by joint index.
 
         Before the segment, returns the velocities at its start. After the segment, returns the velocities at its end.
 
@@ -98,7 +98,7 @@ class StreamSegment(NamedTuple):
         return {index: between * way + ends[index] for index, way in self.way.items()}
 
     def acceleration_at_end(self) -> Mapping[int, float]:
-        """Returns accelerations at the segment's end [rad or m per tick squared], keyed by joint index."""
+        """Returns accelerations [rad or m per tick squared] at the segment's end, keyed by joint index."""
         first, last = self.slopes or (self.velocity(self.end),) * 2
         return {
             index: (2.0 * first[index] + 4.0 * last[index] - 6.0 * way / self.length) / self.length
@@ -136,9 +136,9 @@ def agree(way: Mapping[int, float], length: float, first: Mapping[int, float], l
 
     Args:
         way: Displacements [rad or m], keyed by joint index.
-        length: Time between the targets [ticks].
-        first: Velocities at the first target [rad or m per tick], keyed by joint index.
-        last: Velocities at the last target [rad or m per tick], keyed by joint index.
+        length: Time [ticks] between the targets.
+        first: Velocities [rad or m per tick] at the first target, keyed by joint index.
+        last: Velocities [rad or m per tick] at the last target, keyed by joint index.
     """
     return all(
         abs(distance - length * (first[index] + last[index]) / 2.0)
@@ -161,7 +161,7 @@ class BoundedMotion:
         limited: Function from a joint index and a position to the position clipped to the joint's limits.
 
     Attributes:
-        brake: Time in which a motion comes to a stop [ticks].
+        brake: Time [ticks] in which a motion comes to a stop.
     """
 
     def __init__(
@@ -188,7 +188,7 @@ class BoundedMotion:
         self._ways: Mapping[int, float] = dict.fromkeys(positions, 0.0)
         self._velocities = velocities or self._ways
         self._apart = 1.0
-        """Interval between the last two targets [ticks]."""
+        """Interval [ticks] between the last two targets."""
         self._last.clear()
         self._bounds: Mapping[int, float] = dict.fromkeys(positions, ROUNDING)
 
@@ -220,9 +220,9 @@ class BoundedMotion:
         period. The smaller estimate counts.
 
         Args:
-            ways: Displacements from the previous target [rad or m], keyed by joint index.
-            apart: Interval since the previous target, from stamps [ticks]; 0 to use the interval between arrivals.
-            corner: Duration of the plan's velocity change at the previous target [ticks]; 0 stands for the period.
+            ways: Displacements [rad or m] from the previous target, keyed by joint index.
+            apart: Interval [ticks] since the previous target, from stamps; 0 to use the interval between arrivals.
+            corner: Duration [ticks] of the plan's velocity change at the previous target; 0 stands for the mean period.
         """
         period = max(self._period, EVERY_TICK)
         apart = apart or max(self._elapsed, EVERY_TICK)
@@ -238,7 +238,7 @@ class BoundedMotion:
         self._bounds = {index: self._bound(index) for index in bounds}
 
     def _bound(self, index: int) -> float:
-        """Returns the new acceleration bound of a joint [rad or m per tick squared].
+        """Returns the new acceleration bound [rad or m per tick squared] of a joint.
 
         The recent targets determine the bound; if these targets are equal, the bound remains unchanged. While the joint
         deviates from the plan, the bound decreases only slowly.
@@ -251,10 +251,10 @@ class BoundedMotion:
         """Advances the set points by one tick, and returns the new set points.
 
         Args:
-            planned: Positions of the plan at the end of the tick [rad or m], keyed by joint index.
+            planned: Positions [rad or m] of the plan at the end of the tick, keyed by joint index.
 
         Returns:
-            Set points at the end of the tick [rad or m], keyed by joint index.
+            Set points [rad or m] at the end of the tick, keyed by joint index.
         """
         if not self._is_bounded:
             return planned
@@ -280,7 +280,7 @@ def _stoppable(distance: float, bound: float) -> float:
     """Returns the largest displacement in one tick after which a motion can still stop within a distance.
 
     Args:
-        distance: The distance [rad or m].
+        distance: The distance to the stop [rad or m].
         bound: Largest deceleration [rad or m per tick squared].
     """
     return math.sqrt(bound * bound / 4.0 + bound * distance) - bound / 2.0

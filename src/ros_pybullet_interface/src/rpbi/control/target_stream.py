@@ -30,7 +30,7 @@ SHORT_SEGMENT = 0.5
 SAME_TIME = 1e-9
 """Difference of times that counts as a rounding error [ticks]."""
 QUIET_S = 60.0
-"""Shortest interval between two warnings about late targets [s] of the world's time."""
+"""Shortest interval [s], in the world's time, between two warnings about late targets."""
 
 
 class TargetStream:
@@ -57,7 +57,7 @@ class TargetStream:
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
         self._velocities: deque[Mapping[int, float]] = deque(maxlen=3)
-        """Velocities at up to three recent targets [rad or m per tick], keyed by joint index.
+        """Velocities [rad or m per tick] at up to three recent targets, keyed by joint index.
 
         Emptied after a shortened segment.
         """
@@ -67,7 +67,7 @@ class TargetStream:
         self.set_points = held
         """Present set points [rad or m], keyed by joint index."""
         self.gap = 0.0
-        """Time between the end of extrapolation and the newest target [ticks]; 0 if the target came earlier."""
+        """Time [ticks] between the end of extrapolation and the newest target; 0 if the target came earlier."""
         self.rests = True
         """Whether set points do not move until the next target."""
 
@@ -77,8 +77,8 @@ class TargetStream:
         Args:
             tick: Number of the first tick after the target came.
             goal: Target positions [rad or m], keyed by joint index.
-            slopes: Velocities at the target positions [rad or m per tick], keyed by joint index; may be empty.
-            stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+            slopes: Velocities [rad or m per tick] at the target positions, keyed by joint index; may be empty.
+            stamp_ns: Time [ns] of sending by the sender's clock; 0 if unknown.
         """
         playout = self.buffer.add(tick, stamp_ns, goal)
         self.gap = playout.gap
@@ -192,8 +192,8 @@ class TargetStream:
         Args:
             length: Duration of the segment [ticks].
             way: Displacements [rad or m], keyed by joint index.
-            first: Velocities at the start [rad or m per tick], keyed by joint index.
-            last: Velocities at the end [rad or m per tick], keyed by joint index.
+            first: Velocities [rad or m per tick] at the start, keyed by joint index.
+            last: Velocities [rad or m per tick] at the end, keyed by joint index.
         """
         before = self._segments[-1]
         goal = {index: self._limited(index, value + way[index]) for index, value in before.goal.items()}

@@ -8,11 +8,11 @@ from rpbi.urdf.joints import JointModel
 from .motion import JointMotion, Motion
 
 TOLERANCES = {"rad": 0.01, "m": 0.001}
-"""Largest position error with which a joint has reached its goal [rad or m], keyed by the joint's unit."""
+"""Largest position error [rad or m] with which a joint has reached its goal, keyed by the joint's unit."""
 REST = {"rad": 0.05, "m": 0.005}
-"""Speed up to which a joint counts as at rest [rad/s or m/s], keyed by the joint's unit."""
+"""Speed [rad/s or m/s] up to which a joint counts as at rest, keyed by the joint's unit."""
 SETTLING_S = 1.0
-"""Time that joints have after the last set point to come to rest at the goal [s] of the world's time."""
+"""Time [s], in the world's time, that joints have after the last set point to come to rest at the goal."""
 LONGEST_S = 1e6
 """Longest duration of a motion [s]; longer durations are refused."""
 SHORTEST_S = 0.04

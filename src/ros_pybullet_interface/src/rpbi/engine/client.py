@@ -112,7 +112,7 @@ def _logged(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class ChangeWatch:
-    """Detects calls of PyBullet that change a world without being recorded.
+    """Detects calls of PyBullet functions that change a world but are not recorded as commands.
 
     The methods of a world record their changes as commands. A direct call of a function in `CHANGING` is not recorded.
 

@@ -37,7 +37,7 @@ class Clock:
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the world was built or reset [s]."""
+        """Simulated time [s] since the world was built or reset."""
         return self.tick * self.dt_ns / NS_PER_S
 
     def advance(self) -> None:

@@ -41,8 +41,8 @@ class PoseInput(Input):
 
     Attributes:
         tf_id: Name of the TF frame.
-        hz: Rate of TF look-ups [Hz], in wall time.
-        timeout_s: Time without a new pose after which the input is stale [s].
+        hz: Rate [Hz] of TF look-ups, in wall time.
+        timeout_s: Time [s] without a new pose after which the input is stale.
         is_tracked: Whether physics moves the body while the input is stale. If so, an unchanged pose with a new stamp
             counts as a new pose.
     """

@@ -6,13 +6,13 @@ import time
 from typing import NamedTuple
 
 MAX_DEBT_S = 0.25
-"""Largest delay of a tick that later ticks recover [s]. A larger delay is counted as lost time instead."""
+"""Largest delay [s] of a tick that later ticks recover. A larger delay is counted as lost time instead."""
 
 LEAST_SHARE = 0.8
 """Share of a processor below which lack of processor time is reported as the reason for a slow world."""
 
 MAX_SLEEP_S = 0.005
-"""Longest sleep between two checks for requests [s]."""
+"""Longest sleep [s] between two checks for requests."""
 
 
 class Pacer:
@@ -22,7 +22,7 @@ class Pacer:
     delay is recovered. A delay beyond MAX_DEBT_S is not recovered.
 
     Args:
-        dt_s: Length of a tick [s] of simulated time.
+        dt_s: Length of a tick [s], in simulated time.
         real_time_factor: Simulated seconds per wall second; 0 to run as fast as possible.
 
     Attributes:
@@ -34,7 +34,7 @@ class Pacer:
         self.overruns = 0
         """Number of ticks that began more than one period late."""
         self.lost_s = 0.0
-        """Sum of the delays that were not recovered [s] of wall time."""
+        """Sum [s] of the delays that were not recovered, in wall time."""
         self.set_factor(real_time_factor)
 
     def set_factor(self, real_time_factor: float) -> None:
@@ -50,7 +50,7 @@ class Pacer:
         self._window_ticks = 0
 
     def is_due(self) -> bool:
-        """Returns whether the next tick is due. If so, counts the tick, and moves the deadline to the next one."""
+        """Returns whether the next tick is due. If so, counts the tick, and moves the deadline by one period."""
         if not self._period_s:
             self._window_ticks += 1
             return True
@@ -100,9 +100,9 @@ class Load(NamedTuple):
 
     Attributes:
         wall_s: Time by a monotonic wall clock [s].
-        loop_s: Processor time of the thread that runs the world [s].
-        process_s: Processor time of all threads of the process [s].
-        physics_s: Wall time spent in PyBullet's steps [s].
+        loop_s: Processor time [s] of the thread that runs the world.
+        process_s: Processor time [s] of all threads of the process.
+        physics_s: Wall time [s] spent in PyBullet's steps.
         ticks: Number of ticks made.
     """
 
@@ -117,7 +117,7 @@ class Load(NamedTuple):
         """Returns the times used and ticks made until now. The thread that runs the world must make the call.
 
         Args:
-            physics_s: Wall time spent in PyBullet's steps [s].
+            physics_s: Wall time [s] spent in PyBullet's steps.
             ticks: Number of ticks made.
         """
         return cls(time.monotonic(), time.thread_time(), time.process_time(), physics_s, ticks)

@@ -24,7 +24,7 @@ DAMPING = 1e-4 * np.eye(6)
 
 
 class ActionPart(Protocol):
-    """A part of an action: consecutive numbers of the action's array.
+    """A part of an action: consecutive values in the action array.
 
     Attributes:
         size: Number of values that belong to the part.
@@ -82,10 +82,10 @@ class PoseAction:
     Args:
         controller: Name, as `ROBOT/CONTROLLER`. The controller needs a `point` on the link, and a pose as its `target`.
         link: Name of the controlled link.
-        low: Lower corner of the target's box-shaped workspace, in the world frame [m].
-        high: Upper corner of the workspace, in the world frame [m].
-        step: Maximum translation per action along each axis [m].
-        turn: Maximum rotation per action about each axis [rad].
+        low: Lower corner [m] of the target's box-shaped workspace, in the world frame.
+        high: Upper corner [m] of the workspace, in the world frame.
+        step: Maximum translation [m] per action along each axis.
+        turn: Maximum rotation [rad] per action about each axis.
     """
 
     size = 6
@@ -132,9 +132,9 @@ class HandAction:
         link: Name of the link, whose URDF frame moves.
         axes: Axes of the world along which the link moves, such as `xy`. Along the remaining axes, the link keeps its
             start position.
-        low: Lower corner of the target's box-shaped workspace, in the world frame [m].
-        high: Upper corner of the workspace, in the world frame [m].
-        step: Maximum translation per action along each axis [m].
+        low: Lower corner [m] of the target's box-shaped workspace, in the world frame.
+        high: Upper corner [m] of the workspace, in the world frame.
+        step: Maximum translation [m] per action along each axis.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class GripperAction:
 
     Args:
         joints: Finger joints, which all get the same target.
-        step: Maximum change of the target per action [m or rad].
+        step: Maximum change [m or rad] of the target per action.
     """
 
     size = 1

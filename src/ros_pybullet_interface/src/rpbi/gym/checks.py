@@ -106,7 +106,10 @@ class CheckedTask:
 
 
 def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> list[str]:
-    """Returns a message for each entry of a value that is not in a space, with key, expected and actual value."""
+    """Checks whether a value is in a space.
+
+    Returns a message for each entry of the value that is not, with the entry's key and its expected and actual value.
+    """
     if isinstance(space, spaces.Dict):
         if not isinstance(value, dict) or value.keys() != space.spaces.keys():
             got = sorted(value) if isinstance(value, dict) else type(value).__name__

@@ -198,8 +198,8 @@ class DelayLine:
 
     Args:
         ticks: Number of ticks per action.
-        observation_ticks: Age of observations [ticks].
-        action_ticks: Delay until an action takes effect [ticks].
+        observation_ticks: Age [ticks] of observations.
+        action_ticks: Delay [ticks] until an action takes effect.
         first: Observation at the start of the episode.
     """
 

@@ -107,7 +107,7 @@ def sensor_parts(world: World, robot: str) -> Iterator[ObservationPart]:
 def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[float]) -> ObservationPart:
     """Returns the part for a body's base pose in the world frame: position [m], then quaternion x, y, z, w.
 
-    The arguments `low` and `high` are the bounds of the position [m].
+    The arguments `low` and `high` are the bounds [m] of the position.
     """
 
     def read() -> Sequence[float]:

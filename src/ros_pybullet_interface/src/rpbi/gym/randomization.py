@@ -126,7 +126,7 @@ class Delays(ConfigModel):
     action_s: PositiveRange = Field((0.0, 0.0), description="Range of the time until an action takes effect [s].")
 
     def drawn(self, random: np.random.Generator, tick_s: float) -> tuple[int, int]:
-        """Draws the delays of observations and of actions [ticks]."""
+        """Draws the delays [ticks] of observations and of actions."""
         observation_s, action_s = (random.uniform(*each) for each in (self.observation_s, self.action_s))
         return round(observation_s / tick_s), round(action_s / tick_s)
 
@@ -175,7 +175,7 @@ class Randomizer:
         """Varies the world, which was just reset.
 
         Returns:
-            Delays of observations and of actions [ticks].
+            Delays [ticks] of observations and of actions.
         """
         for each in self._in_world():
             each.apply(self._world, random)

@@ -60,7 +60,7 @@ class WorldTask(ABC):
 
     @abstractmethod
     def actions(self) -> Sequence[ActionPart]:
-        """Returns the parts of an action, in the order of their numbers in the action's array."""
+        """Returns the parts of an action, in the order in which their values appear in the action array."""
 
     def parts(self) -> Iterator[ObservationPart]:
         """Yields the parts of an observation: by default joints and force-torque sensors of all robots."""
@@ -124,5 +124,5 @@ class WorldTask(ABC):
         """Returns whether the task is done. A subclass decides this from the simulation state, not from the reward."""
 
     def has_ended(self) -> bool:
-        """Returns whether the episode is over: by default when the task is done."""
+        """Returns whether the episode is over; by default, it is over when the task is done."""
         return self.has_succeeded()

@@ -33,7 +33,7 @@ Result = tuple[Any, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[
 
 
 class WorldVectorEnv(VectorEnv[Any, Any, Any]):
-    """A vector of environments in worker processes; each process has one or more environments.
+    """A vector of n environments in worker processes; each process has one or more environments.
 
     For a step, each process gets a single request. Observations are transferred in shared memory. Processes are not
     forked but started as new programs. Therefore scripts do not need `if __name__ == "__main__"`, and the calling
@@ -42,7 +42,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
     Args:
         makers: Functions without arguments, each of which makes one environment. Lambdas are allowed.
         workers: Number of processes, by default the number of processors; reduced to the number of environments.
-        autoreset_mode: When an environment whose episode has ended is reset, see docs/gym.md.
+        autoreset_mode: Decides when an environment is reset after the end of its episode, see docs/gym.md.
 
     Attributes:
         workers: Number of processes.
@@ -113,7 +113,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         """Takes a step in all environments.
 
         Args:
-            actions: Shape (n, ...).
+            actions: One action for each of the n environments, shape (n, ...).
 
         Returns:
             Observations, rewards, terminations, truncations, and information.
@@ -268,7 +268,10 @@ def request(name: str, *arguments: Any) -> bytes:
 
 
 def _parts(count: int, workers: int) -> list[tuple[int, int]]:
-    """Divides environments evenly among workers; returns each worker's first index, and the last index plus 1."""
+    """Divides environments evenly among workers.
+
+    Returns, for each worker, the index of its first environment, and the index of its last environment plus 1.
+    """
     ends = [count * each // workers for each in range(workers + 1)]
     return list(zip(ends, ends[1:]))
 

@@ -93,7 +93,7 @@ class Worker:
     Args:
         makers: Functions that make one environment each.
         first: Index of this worker's first environment among all environments.
-        mode: When environments are reset, see `Slot`.
+        mode: Decides when environments are reset, see `Slot`.
     """
 
     def __init__(self, makers: Sequence[Callable[[], Any]], first: int, mode: AutoresetMode) -> None:

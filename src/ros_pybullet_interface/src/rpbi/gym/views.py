@@ -24,7 +24,7 @@ class Views:
         world: The world.
         names: Cameras whose images are in observations.
         mode: Render mode: `rgb_array`, `human`, or None.
-        period_s: Minimum wall time between two returns of `render` in mode `human` [s].
+        period_s: Minimum wall time [s] between two returns of `render` in mode `human`.
 
     Attributes:
         spaces: Space of each image of an observation: `CAMERA/colour`, uint8, shape (height, width, 3), and

@@ -59,7 +59,7 @@ class BulletChain:
         self.reach = Reach.of(knots[0], map(math.dist, knots, knots[1:]), driven)
 
     def set(self, q: np.ndarray) -> None:
-        """Sets the m joint positions [rad or m]."""
+        """Sets the positions [rad or m] of the m joints."""
         if self._joint_indices:
             self.pb.resetJointStatesMultiDof(self.body_id, self._joint_indices, [[position] for position in q.tolist()])
 
@@ -80,7 +80,7 @@ class BulletChain:
         return np.array(error)
 
     def residual(self, target: Target, q: np.ndarray) -> Residual:
-        """Sets m joint positions [rad or m], and returns the link's distance and angle to a target."""
+        """Sets the positions [rad or m] of the m joints, and returns the link's distance and angle to a target."""
         self.set(q)
         error = self.error(target).tolist()
         return Residual(math.hypot(*error[:3]), math.hypot(*error[3:]))

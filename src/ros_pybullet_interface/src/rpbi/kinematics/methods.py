@@ -20,7 +20,7 @@ Arguments: m start positions [rad or m]; m booleans, whether to hold each joint;
 Returns m positions [rad or m].
 """
 BREAK_S = 5e-5
-"""Pause between stages, in which the simulation thread can take Python's global interpreter lock [s]."""
+"""Pause [s] between stages, in which the simulation thread can take Python's global interpreter lock."""
 FROZEN = 1e6
 """Damping with which a joint does not move."""
 DAMPING = 1e-3
@@ -38,10 +38,11 @@ class DampedLeastSquares:
     Instances are functions of type `Step`.
 
     Args:
-        chain: Chain that moves the link.
+        chain: Chain of the m joints that move the link.
         target: Target of the link.
-        threshold_m: Distance from the target at which iterations stop [m].
-        damping: m relative dampings, of which the smallest is 1. A joint with a larger damping moves less.
+        threshold_m: Distance [m] from the target at which iterations stop.
+        damping: Relative damping of each of the m joints of the chain; the smallest is 1. A joint with a larger damping
+            moves less.
     """
 
     def __init__(self, chain: BulletChain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
@@ -74,7 +75,7 @@ class DampedLeastSquares:
 
 
 LARGEST_STEP = np.pi / 4
-"""Largest motion of a joint in one step [rad or m], as in the paper by Buss and Kim."""
+"""Largest motion [rad or m] of a joint in one step, as in the paper by Buss and Kim."""
 
 
 class SelectivelyDampedLeastSquares:
@@ -103,7 +104,7 @@ class SelectivelyDampedLeastSquares:
 
 
 def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Returns the step of m joints that reduces an error.
+    """Returns the step of m joints, shape (m,), with which the joints reduce an error of the link.
 
     The limit of the step along a singular vector is lower if the step needs more joint motion.
     """
@@ -126,9 +127,9 @@ def _clamped(step: np.ndarray, largest: float) -> np.ndarray:
 
 POSTURE_STEPS = 60
 LARGEST_POSTURE_STEP = 0.2
-"""Largest motion of a joint of weight 1 in one step [rad or m]."""
+"""Largest motion [rad or m] of a joint of weight 1 in one step."""
 DONE = 1e-3
-"""Step of a joint of weight 1 below which the search ends [rad or m]."""
+"""Step [rad or m] of a joint of weight 1 below which the search ends."""
 POSTURE_DAMPING = 1e-6
 """Damping that keeps the pseudo-inverse finite at singular configurations."""
 
@@ -142,13 +143,13 @@ def towards_posture(
     the error of the previous step (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
 
     Args:
-        chain: Chain that moves the link.
+        chain: Chain of the m joints that move the link.
         target: Target of the link.
         limits: Limits of the m joints.
-        rest: m positions of the posture [rad or m].
+        rest: m positions [rad or m] of the posture.
         ranges: m weights up to 1, proportional to the joints' ranges. A joint's distance from the posture is divided by
             the joint's weight.
-        q: m positions of the first solution [rad or m].
+        q: m positions [rad or m] of the first solution.
         size: Maximum residual of a solution, see `Residual.size`.
 
     Returns:
@@ -211,7 +212,7 @@ def go_near(chain: BulletChain, target: Target, limits: Limits, q: np.ndarray, s
     Uses L-BFGS-B (Byrd, Lu, Nocedal and Zhu, SIAM Journal on Scientific Computing 16(5), 1995).
 
     Args:
-        chain: Chain that moves the link.
+        chain: Chain of the m joints that move the link.
         target: Target of the link.
         limits: Limits of the m joints.
         q: m start positions [rad or m].

@@ -22,7 +22,7 @@ class PybulletProblem:
 
     Attributes:
         link_name: Name of the link in the URDF; not the root link.
-        targetPosition: Target x, y, z of the link's URDF frame, in the frame of the robot's base link [m].
+        targetPosition: Target x, y, z [m] of the link's URDF frame, in the frame of the robot's base link.
         targetOrientation: Target quaternion x, y, z, w in the same frame, not necessarily of length 1. Empty accepts
             any orientation.
         lowerLimits: n lower limits [rad or m], which narrow the URDF's limits but never widen them.
@@ -34,7 +34,7 @@ class PybulletProblem:
         solver: 0 for damped least squares, 1 for selectively damped least squares.
         currentPosition: n start positions [rad or m]. Joints that do not move the link keep these positions.
         maxNumIterations: Maximum number of iterations from one start.
-        residualThreshold: Distance at which the search stops [m], at most 1 mm. Ten times this number is the threshold
+        residualThreshold: Distance [m] at which the search stops, at most 1 mm. Ten times this number is the threshold
             of the angle [rad].
 
     Raises:
@@ -79,7 +79,7 @@ class PybulletProblem:
             raise ValueError(f"residualThreshold: must not be negative, got {self.residualThreshold}")
 
     def check_lengths(self, joint_names: Sequence[str]) -> None:
-        """Checks the lengths of the lists per joint.
+        """Checks the lengths of the lists that have one value per joint.
 
         Args:
             joint_names: Names of the n joints.
@@ -147,6 +147,6 @@ class PybulletSolution:
 
     @property
     def chain_positions(self) -> tuple[float, ...]:
-        """Positions of the joints that move the link [rad or m], in the order of `chain`."""
+        """Positions [rad or m] of the joints that move the link, in the order of `chain`."""
         by_name = dict(zip(self.joint_names, self.positions))
         return tuple(by_name[name] for name in self.chain)

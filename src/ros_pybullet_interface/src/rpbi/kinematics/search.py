@@ -32,11 +32,11 @@ SEED = 0
 MUCH_NEARER = 0.8
 """For a target out of reach: ratio of errors below which another posture replaces the one near the present posture."""
 FAR = 1.0
-"""Motion of a joint from which a solution may be in another branch, such as elbow up and elbow down [rad or m]."""
+"""Motion of a joint [rad or m] from which a solution may be in another branch, such as elbow up and elbow down."""
 STARTS_NEARBY = 16
 """Number of starts near the present positions, or the rest posture, from which a nearer solution is searched."""
 SPREAD = 0.4
-"""Standard deviation of the nearby starts [rad or m]."""
+"""Standard deviation [rad or m] of the nearby starts."""
 LEAST_WEIGHT = 1e-3
 """Smallest damping and smallest range of a joint, as a share of the largest."""
 
@@ -45,7 +45,7 @@ class Search:
     """Searches for positions of a chain's m joints that solve one problem.
 
     Args:
-        chain: Chain that moves the link.
+        chain: Chain of the m joints that move the link.
         target: Target of the link.
         limits: Limits of the m joints.
         problem: The problem, already checked for the robot.
@@ -67,7 +67,7 @@ class Search:
         self._iterations_left = JOINT_ITERATIONS // max(1, len(current))
 
     def run(self) -> tuple[np.ndarray, Residual]:
-        """Searches, and returns the best m positions found [rad or m] and their residual.
+        """Searches, and returns the best m positions [rad or m] found and their residual.
 
         For a target out of reach, the positions minimize the error locally, near the present posture. A moving target
         therefore does not cause jumps between postures. Another posture is returned only if its error is much smaller.
@@ -114,7 +114,7 @@ class Search:
         """Searches from one start after another until a solution is found.
 
         Returns:
-            The best positions found so far [rad or m], and their residual.
+            The best positions [rad or m] found so far, and their residual.
         """
         best = np.array(self._current)
         least = self._chain.residual(self._target, best)

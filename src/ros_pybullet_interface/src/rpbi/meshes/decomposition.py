@@ -20,9 +20,9 @@ from .trial import limit_resources
 from .triangles import read_triangles
 
 MAX_CPU_S = 600
-"""Processor time after which the process of V-HACD is ended [s]."""
+"""Processor time [s] after which the process of V-HACD is ended."""
 MAX_WALL_S = 900.0
-"""Wall time after which the process of V-HACD is ended [s]."""
+"""Wall time [s] after which the process of V-HACD is ended."""
 _PARTS = "parts.obj"
 _without_cache: dict[str, Path] = {}
 """Temporary folders with parts of meshes, used if the cache cannot be written; keyed by the name of the cache entry."""

@@ -24,9 +24,9 @@ TRIAL = 3
 MAX_BYTES = 2 * 2**30
 """Memory limit of the trial process [bytes]; further allocations fail."""
 MAX_CPU_S = 20
-"""Processor time of the trial process after which a mesh is refused [s]."""
+"""Processor time [s] of the trial process after which a mesh is refused."""
 LONGEST_TRIAL_S = 45.0
-"""Wall time of the trial process after which a mesh is refused [s]."""
+"""Wall time [s] of the trial process after which a mesh is refused."""
 MAX_BATCH = 100
 """Largest number of meshes that one trial process loads."""
 

@@ -63,7 +63,7 @@ def _read_obj(text: str) -> list[Triangles]:
 
 
 def volumes(path: str) -> tuple[float, float] | None:
-    """Returns the volume that a mesh encloses, and the total volume of its parts' convex hulls [m^3].
+    """Returns the volume [m^3] that a mesh encloses, and the total volume [m^3] of its parts' convex hulls.
 
     Returns None if the surface is not closed, or the mesh cannot be read. Results are cached; the key is a hash of the
     file's content.

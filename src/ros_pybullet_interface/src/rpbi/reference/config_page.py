@@ -65,7 +65,7 @@ _SCHEMA_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 class Place(NamedTuple):
-    """Section of the page that documents a mapping which occurs inside one or more kinds of files.
+    """A section of the reference page, about a mapping that occurs inside one or more kinds of files.
 
     Attributes:
         heading: Heading of the section: the mapping's path in the first file that contains the mapping.

@@ -31,9 +31,9 @@ class Intrinsics:
     Attributes:
         width_px: Number of columns of the image.
         height_px: Number of rows of the image.
-        fov_deg: Vertical field of view, from the upper edge of the first row to the lower edge of the last row [deg].
-        near_m: Nearest depth that is drawn, along the optical axis [m].
-        far_m: Farthest depth that is drawn, along the optical axis [m]; background pixels have this depth.
+        fov_deg: Vertical field of view [deg], from the upper edge of the first row to the lower edge of the last row.
+        near_m: Nearest depth that is drawn [m], along the optical axis.
+        far_m: Farthest depth that is drawn [m], along the optical axis; background pixels have this depth.
     """
 
     width_px: int = 640
@@ -132,7 +132,7 @@ def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> 
         intrinsics: Intrinsics of the camera, for its near and far plane.
 
     Returns:
-        Depths along z of the optical frame [m], same shape.
+        Depths [m] along z of the optical frame, same shape.
     """
     near, far = np.float32(intrinsics.near_m), np.float32(intrinsics.far_m)
     inverse = np.subtract(np.float32(1.0), buffer)
@@ -149,7 +149,7 @@ class DepthNoise(NamedTuple):
     Indoor Mapping Applications, Sensors 12, 2012, eq. 11: 1.425e-3 / m for the Kinect).
 
     Attributes:
-        constant_m: Part of the standard deviation that does not depend on the depth [m].
+        constant_m: Part of the standard deviation [m] that does not depend on the depth.
         growth_per_m: Factor of the squared depth in the standard deviation [1/m].
         seed: Seed, 0 or greater.
     """

@@ -36,7 +36,7 @@ LONGEST_PAUSE_S = 30.0
 STABLE_AFTER_S = 10.0
 STOP_TIMEOUT_S = 5.0
 SILENT_AFTER_S = 5.0
-"""Longest time without a message from a renderer that is ready [s]; beyond it, a warning is logged."""
+"""Longest time [s] without a message from a renderer that is ready; beyond it, a warning is logged."""
 
 
 class RenderClient:
@@ -220,7 +220,11 @@ class RenderClient:
         self._send_log()
 
     def _watch(self, is_heard: bool) -> None:
-        """Logs when the process has been silent for SILENT_AFTER_S, and when messages arrive again (`is_heard`)."""
+        """Logs a warning if the process has been silent for SILENT_AFTER_S, and another once messages arrive again.
+
+        Args:
+            is_heard: Whether messages of the process have arrived since the last call; also true during its start.
+        """
         now_s = time.monotonic()
         if is_heard:
             self._heard_s = now_s

@@ -22,7 +22,7 @@ from .tessellation import FineShapes
 log = logging.getLogger(__name__)
 
 SHORTEST_STEP_S = 1e-9
-"""Length of a time step so short that bodies practically do not move [s]."""
+"""Length of a time step [s] so short that bodies practically do not move."""
 
 
 class SoftShapes:
@@ -52,7 +52,7 @@ class SoftShapes:
         """Moves the nodes of soft bodies; the caller must set the poses of rigid bodies afterwards.
 
         Args:
-            nodes: For each soft body, the body and the positions of all its simulated nodes in the world frame [m].
+            nodes: For each soft body, the body and the positions [m] of all its simulated nodes in the world frame.
         """
         for body, places in nodes:
             self._pb.resetMeshData(body.body_id, places)

@@ -31,13 +31,13 @@ from .renderers import Renderer, open_renderer
 log = logging.getLogger(__name__)
 
 DEMAND_PERIOD_S = 0.05
-"""Period of checks which images have viewers [s]."""
+"""Period [s] of checks which images have viewers."""
 
 ALIVE_PERIOD_S = 0.5
-"""Period of the message `Alive` [s]."""
+"""Period [s] of the message `Alive`."""
 
 STUCK_AFTER_S = 300.0
-"""Longest pass of the loop [s]; beyond it, a driver probably hangs, and the process ends itself."""
+"""Longest pass [s] of the loop; beyond it, a driver probably hangs, and the process ends itself."""
 
 
 class RenderProcess:
@@ -121,7 +121,7 @@ class RenderProcess:
             self._mirror.apply(entry)
 
     def _show(self, scene: DrawnScene) -> None:
-        """Draws the streams of a scene that have viewers, and passes the frame to the sink."""
+        """Draws those streams of a scene that have viewers, and passes the frame to the sink."""
         sample = scene.sample
         self._channel.send(SceneAccepted(sample.name))
         assert self._sink is not None

@@ -9,7 +9,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 TOLERANCE_M = 2e-4
-"""Largest distance between a circle and the polygon that replaces it [m], unless that needs more than `MAX_CORNERS`."""
+"""Largest distance [m] between a circle and the polygon that replaces it, unless that needs more than `MAX_CORNERS`."""
 MIN_CORNERS, MAX_CORNERS = 24, 160
 PLANE_HALF_WIDTH_M = 100.0
 """Half the edge length of the square that represents an infinite plane."""
@@ -19,10 +19,10 @@ class SurfaceMesh(NamedTuple):
     """A triangle mesh with a normal at each corner.
 
     Attributes:
-        points: Positions of the corners [m], shape (n, 3).
-        normals: Outward unit normals at the corners, shape (n, 3).
-        triangles: Indices into `points` of each triangle's corners, counter-clockwise as seen from outside, shape
-            (m, 3).
+        points: Positions [m] of the n corners, shape (n, 3).
+        normals: Outward unit normals at the n corners, shape (n, 3).
+        triangles: For each of t triangles, the indices of the triangle's corners in `points`, counter-clockwise as seen
+            from outside, shape (t, 3).
     """
 
     points: Array
@@ -38,7 +38,7 @@ class SurfaceMesh(NamedTuple):
 
 
 def box(half_extents: Sequence[float]) -> SurfaceMesh:
-    """Returns a box centred at the origin; `half_extents` is half the size along x, y and z [m].
+    """Returns a box centred at the origin; `half_extents` is half the size [m] along x, y and z.
 
     Each side has its own corners, with the side's normal.
     """
@@ -84,9 +84,9 @@ def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = Non
     """Returns a mesh with given corners and triangles.
 
     Args:
-        points: Positions of the corners [m], shape (n, 3).
-        triangles: Indices into `points`, shape (m, 3).
-        normals: Unit normals at the corners, shape (n, 3); None gives each triangle's corners the triangle's normal.
+        points: Positions [m] of the n corners, shape (n, 3).
+        triangles: For each of t triangles, the indices of the triangle's corners in `points`, shape (t, 3).
+        normals: Unit normals at the n corners, shape (n, 3); None gives each triangle's corners the triangle's normal.
     """
     if normals is not None:
         return SurfaceMesh(points, normals, triangles)

@@ -35,7 +35,7 @@ def in_forks(
     Args:
         work: Function that takes a group and returns a picklable result.
         groups: Groups of parts, see `groups_of`.
-        cpu_s: Maximum processor time of each fork [s]; None means no limit.
+        cpu_s: Maximum processor time [s] of each fork; None means no limit.
 
     Raises:
         InterfaceError: If the function raises an error in a fork, or a fork ends without a result.
@@ -64,7 +64,7 @@ def limit_cpu_time(cpu_s: int) -> None:
     """Limits the further processor time of this process. At the limit, the signal SIGXCPU ends this process.
 
     Args:
-        cpu_s: Processor time that this process may still use [s].
+        cpu_s: Processor time [s] that this process may still use.
     """
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1

@@ -30,7 +30,10 @@ class Answer(NamedTuple):
 
 
 def of(body_type: type[Body]) -> Owners:
-    """Returns a function that maps a body of the type to a tuple with its name, and other bodies to an empty tuple."""
+    """Returns a function that maps a body of class `body_type` to a tuple with the body's name.
+
+    The function maps any other body to an empty tuple.
+    """
     return lambda body: (body.name,) if isinstance(body, body_type) else ()
 
 
@@ -44,8 +47,8 @@ class Topic(NamedTuple):
             input's topic, the function that converts a message to the input's value. For a topic in `BODY_TOPICS`, the
             function that acts on a body, given the body's context and a message. None if other code handles the topic.
         meaning: Content of the topic or effect of a message, in a sentence, with the YAML key that sets the rate.
-        key: Key of the main YAML file that opens the topic or sets its rate, where 0 is off. Empty if the topic is
-            always open.
+        key: Key in the main YAML file; the key opens the topic, or sets the topic's rate, where 0 is off. Empty if the
+            topic is always open.
         owners: Returns the names with which a body subscribes to the topic, see `Owners`.
         on_tf: For a sensor's topic whose samples also go to TF: converts a sample and its stamp [ns] to poses and
             their stamp [ns]. None for other topics.

@@ -33,7 +33,10 @@ def use_own_frames(frames: Container[str]) -> None:
 
 
 def named_frame(frame: str) -> str:
-    """Returns a name that a YAML file gives a frame, with the prefix if the frame belongs to this node's world."""
+    """Returns the full name of a frame that a YAML file names.
+
+    The full name begins with the prefix if the frame belongs to this node's world.
+    """
     return prefixed(frame) if frame in _own_frames else frame
 
 

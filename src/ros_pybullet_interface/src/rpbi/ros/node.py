@@ -98,10 +98,10 @@ def parameter_above(name: str) -> Any:
 log = logging.getLogger(__name__)
 
 LONGEST_END_S = 10.0
-"""Longest wait for the simulation loop and the renderer at shutdown [s]; beyond it, ROS shuts down without them."""
+"""Longest wait [s] for the simulation loop and the renderer at shutdown; beyond it, ROS shuts down without them."""
 
 SWITCH_S = 0.0005
-"""Longest wait of a thread for Python's global lock [s]; Python's default, 5 ms, is five ticks at 1 kHz."""
+"""Longest wait [s] of a thread for Python's global lock; Python's default, 5 ms, is five ticks at 1 kHz."""
 
 MAX_WARNINGS = 20
 """Largest number of warnings of a world that are logged one by one at its start; further ones are only counted."""

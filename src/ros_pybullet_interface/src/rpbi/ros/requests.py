@@ -16,7 +16,7 @@ from .simulation import Simulation
 T = TypeVar("T")
 
 GIVE_UP_AFTER_S = 30.0
-"""Longest wait for the next pass of the simulation loop [s] of wall time; beyond it, a waiting request fails."""
+"""Longest wait [s], in wall time, for the next pass of the simulation loop; beyond it, a waiting request fails."""
 
 
 class Requests:

@@ -21,9 +21,9 @@ from rpbi.world.saved.state import WorldState
 log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
-"""Shortest period of the loop while the world is stopped [s]."""
+"""Shortest period [s] of the loop while the world is stopped."""
 BURST_S = 0.005
-"""Longest time that the loop runs due ticks before it sends messages and serves requests [s]."""
+"""Longest time [s] that the loop runs due ticks before it sends messages and serves requests."""
 
 
 class StepRequest:
@@ -337,7 +337,7 @@ class Simulation:
 
         Args:
             ticks: Maximum number of ticks.
-            end_s: Latest end, as a time of the monotonic clock [s].
+            end_s: Latest end [s], as a time of the monotonic clock.
         """
         return self.world.run_idle(min(ticks, self._state.ticks_to_hash - 1), end_s)
 

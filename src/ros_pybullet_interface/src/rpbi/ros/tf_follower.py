@@ -21,13 +21,13 @@ from rpbi.plugins import is_foreign
 from .headers import named_frame, world_frame
 
 TF_MISSING_AFTER_S = 5.0
-"""Longest wait for the first transform of a frame [s] of wall time; beyond it, a warning is logged."""
+"""Longest wait [s], in wall time, for the first transform of a frame; beyond it, a warning is logged."""
 LONGEST_NAP_S = 0.1
-"""Longest sleep of the thread [s] of wall time, so that it soon follows frames that were added."""
+"""Longest sleep [s] of the thread, in wall time, so that it soon follows frames that were added."""
 LOOK_FROM, LOOK_UNTIL = 0.75, 1.5
 """Shares of the period that decide when a frame is looked up, see `FollowedFrame.due_s`."""
 STALE_AGAIN_AFTER_S = 30.0
-"""Shortest time between two warnings that the same frame is stale [s] of wall time."""
+"""Shortest wall time [s] between two warnings that the same frame is stale."""
 
 
 class WatchedTf:
@@ -35,7 +35,7 @@ class WatchedTf:
 
     Attributes:
         watched: The child frames whose arrival times are recorded.
-        came_s: Last arrival time of a transform, as a time of the monotonic clock [s], indexed by child frame.
+        came_s: Last arrival time [s] of a transform, as a time of the monotonic clock, indexed by child frame.
         something_came: Event that is set whenever a transform of a watched frame arrives.
     """
 
@@ -98,19 +98,22 @@ class FollowedFrame:
         self.last_pose: Pose | None = None
         self.last_stamp_ns = -1
         self.news_time_s = 0.0
-        """The world's time at which the frame's stamp last changed [s]; `news_s` is the same moment in wall time."""
+        """The world's time [s] at which the frame's stamp last changed; `news_s` is the same moment in wall time."""
         self.is_stale = False
         self.quiet_until_s = 0.0
 
     def due_s(self, came_s: float) -> float:
-        """Returns the time of the next look-up on the monotonic clock [s].
+        """Returns the time [s] of the next look-up of the frame's pose, on the monotonic clock.
 
-        If no transform has arrived since the last look-up, the next look-up is due one period after the last look-up.
-        If a transform has arrived less than LOOK_FROM periods after the stamp last changed, the next look-up is due
-        LOOK_UNTIL periods after the last look-up. A transform that arrives later makes a look-up due at once.
+        A period is the reciprocal of the look-up rate `pose_input.hz`. The look-up is due:
+
+        - one period after the last look-up, if no transform of the frame has arrived since the last look-up;
+        - LOOK_UNTIL periods after the last look-up, if a transform has arrived less than LOOK_FROM periods after
+          the last look-up that found a new stamp;
+        - at the arrival of the transform, if the transform has arrived later than that.
 
         Args:
-            came_s: Time of the last transform's arrival on the monotonic clock [s].
+            came_s: Time [s] at which the frame's last transform arrived, on the monotonic clock.
         """
         if came_s <= self.looked_s:
             return self.looked_s + self.period_s
@@ -118,9 +121,9 @@ class FollowedFrame:
         return self.looked_s + LOOK_UNTIL * self.period_s if is_early else came_s
 
     def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
-        """Stores the stamp of the frame's newest pose [ns], and returns whether the stamp has changed.
+        """Stores the stamp [ns] of the frame's newest pose, and returns whether the stamp has changed.
 
-        `now_s` is the present time of the monotonic clock [s], `time_s` the present time of the world [s].
+        `now_s` is the present time [s] of the monotonic clock, `time_s` the present time [s] of the world.
         """
         self.news_time_s = min(self.news_time_s, time_s)  # the world was reset
         if stamp_ns == self.last_stamp_ns:
@@ -129,7 +132,7 @@ class FollowedFrame:
         return True
 
     def age_s(self, now_s: float, time_s: float) -> float:
-        """Returns the time since the frame's stamp last changed [s]: in wall time or world time, whichever is less."""
+        """Returns the time [s] since the frame's stamp last changed: in wall time or world time, whichever is less."""
         return min(now_s - self.news_s, time_s - self.news_time_s)
 
 
@@ -208,7 +211,7 @@ class TfFollower:
                     self._warn(followed.slot, f"TF refused: {reason}")
 
     def _report_stale(self, followed: FollowedFrame, stamp_ns: int, now_s: float) -> None:
-        """Logs a warning when a frame becomes stale, and an info message when the frame's transforms arrive again.
+        """Logs a warning if a frame has become stale, or an info message if a stale frame has a new stamp again.
 
         Static frames are never stale.
         """

@@ -56,7 +56,7 @@ CAMERA_HZ = 30.0
 LARGEST_SHARE = 0.25
 """Largest share of wall time that drawing may take; if drawing is slower, fewer images are published."""
 HELD_HZ = 60.0
-"""Rate at which a held key is published [Hz] of wall time; presses and releases are published at once."""
+"""Rate [Hz], in wall time, at which a held key is published; presses and releases are published at once."""
 KEY_WORDS = {DOWN: "key_is_down", PRESSED: "", RELEASED: "key_was_released"}
 MOUSE_WORDS = {1: "mouse_move_event", 2: "mouse_button_event"}
 NO_BUTTON = 255
@@ -122,7 +122,7 @@ class VisualizerImage:
     Args:
         window: The window.
         clock: The world's clock, for the stamps.
-        hz: Maximum rate of the images [Hz] of wall time.
+        hz: Maximum rate [Hz] of the images, in wall time.
         width_px: Number of columns of an image.
         height_px: Number of rows of an image.
     """

@@ -15,7 +15,7 @@ class LowPass:
     The first output is the first input.
 
     Args:
-        cutoff_hz: Cutoff frequency f, at which the amplitude is reduced to 1/sqrt(2) [Hz].
+        cutoff_hz: Cutoff frequency f [Hz], at which the amplitude is reduced by the factor 1/sqrt(2).
         dt_s: Length of a tick [s].
     """
 
@@ -37,8 +37,8 @@ class SeededNoise:
 
     Args:
         seed: Seed, 0 or greater.
-        deviation: Standard deviation of each of the n values.
-        bias: Mean of each of the n values.
+        deviation: Standard deviation of each of the n noise values.
+        bias: Mean of each of the n noise values.
     """
 
     def __init__(self, seed: int, deviation: Sequence[float], bias: Sequence[float]) -> None:

@@ -20,7 +20,7 @@ from .sensor import SensedBody, SensedWorld, Sensor
 
 
 class ForceTorqueSensor(Sensor):
-    """Measures the force and the moment about the joint's origin that a joint transmits.
+    """Measures the force that a joint transmits, and the moment that it transmits about its origin.
 
     Force and moment are in the axes of the URDF frame of the joint's child link.
 
@@ -31,7 +31,7 @@ class ForceTorqueSensor(Sensor):
     of joints, control modes and limits.
 
     Args:
-        default_hz: Rate of the sensor if the configuration has no rate [Hz].
+        default_hz: Rate [Hz] of the sensor if the configuration has no rate.
     """
 
     Config = ForceTorqueConfig

@@ -92,7 +92,7 @@ class Sensor(ABC):
 
     Attributes:
         name: Name in topics: the name of the body or camera, or a text such as `BODY/SENSOR` or `BODY/JOINT`.
-        hz: Rate in the world's time [Hz]; 0 is off. The world may change this rate.
+        hz: Rate [Hz] in the world's time; 0 is off. The world may change this rate.
         wanted: Whether the samples have receivers; without receivers, the sensor is not read.
     """
 

@@ -20,7 +20,7 @@ class SurfaceSensor(Sensor):
         self._rgba = body.pb.getVisualShapeData(body.body_id)[0][7]
 
     def read(self, tick: int) -> SurfaceSample:
-        """Reads the positions of the corners in the world frame [m], three corners for each triangle."""
+        """Reads the positions [m] of the corners in the world frame, three corners for each triangle."""
         _, corners = self._body.pb.getMeshData(self._body.body_id, -1)
         if not math.isfinite(sum(map(sum, corners))):
             raise PhysicsError(f"{self.name}: surface is not finite any more at tick {tick}")

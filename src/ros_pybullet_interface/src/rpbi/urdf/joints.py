@@ -22,7 +22,7 @@ _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
 
 
 _COUPLING_EFFORT = 1e6
-"""Largest effort of the constraint that makes a mimic joint follow its leader [N m or N]."""
+"""Largest effort [N m or N] of the constraint that makes a mimic joint follow its leader."""
 _COUPLING_ERP = 1.0
 """Error reduction parameter of this constraint: share of the position error that is corrected in a step."""
 
@@ -109,7 +109,7 @@ class Joint:
 
     @property
     def is_driven(self) -> bool:
-        """Whether the joint is revolute or prismatic: only such joints can have motors."""
+        """Whether the joint is revolute or prismatic. Only such joints can have motors."""
         return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
 
 
@@ -119,7 +119,7 @@ class Coupling(NamedTuple):
     Attributes:
         leader: PyBullet's index of the leader, which is not a mimic joint itself.
         multiplier: Ratio of the mimic joint's velocity to the leader's velocity.
-        offset: Position of the mimic joint when the leader's position is 0 [rad or m].
+        offset: Position [rad or m] of the mimic joint when the leader's position is 0.
     """
 
     leader: int
@@ -187,7 +187,7 @@ class JointModel:
         return Coupling(self[leader].index, multiplier, offset)
 
     def effort_limit(self, joint: Joint) -> float:
-        """Returns the maximum effort of a driven joint's motor [N m or N].
+        """Returns the maximum effort [N m or N] of a driven joint's motor.
 
         The motor also drives the mimic joints that follow the joint. Therefore, the maximum efforts of these mimic
         joints are added, each multiplied by the absolute value of the coupling's multiplier.
@@ -203,7 +203,7 @@ class JointModel:
 
         Args:
             positions: Positions [rad or m] or velocities [rad/s or m/s], indexed by PyBullet's joint index.
-            offsets: Whether to add the offsets of couplings: True for positions, False for velocities.
+            offsets: True adds the offsets of couplings, as needed for positions; False is for velocities.
 
         Returns:
             The given values, and the values of the mimic joints whose leaders are in `positions`.

@@ -258,7 +258,7 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
 
 
 def _largest_radius(pb: Client, body_id: int, link: int) -> float:
-    """Returns an upper bound of the distance from a link's centre of mass to points of its collision shape [m].
+    """Returns an upper bound [m] of the distance from a link's centre of mass to points of its collision shape.
 
     The bound is inf for a link without a collision shape, and for a body in maximal coordinates, whose shapes PyBullet
     does not report.

@@ -14,7 +14,7 @@ class Momentum(NamedTuple):
     """Momentum of a subtree, in world axes.
 
     Attributes:
-        origin: Position of the origin of the first link's URDF frame, in the world frame [m].
+        origin: Position [m] of the origin of the first link's URDF frame, in the world frame.
         quat_xyzw: Orientation of the first link's URDF frame in the world frame.
         origin_velocity: Velocity of `origin` [m/s].
         linear: Linear momentum [kg m/s].

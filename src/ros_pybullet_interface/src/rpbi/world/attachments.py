@@ -20,7 +20,7 @@ from rpbi.geometry import LinkWrench, Pose, rotated
 log = logging.getLogger(__name__)
 
 _UNLIMITED_N = 1e9
-"""Force limit of a constraint in PyBullet [N], so large that it is never reached; PyBullet's default is 500 N."""
+"""Force limit [N] of a constraint in PyBullet, so large that it is never reached; PyBullet's default is 500 N."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class Attachments:
             self._holding[name] = replace(each, constraint=constraint)
 
     def refuse_moving(self, name: str) -> None:
-        """Checks that a body may be teleported: attachments would pull the body back at once.
+        """Checks that a body may be teleported; an attachment to another body would pull the body back at once.
 
         Raises:
             ValueError: If the body is attached to another body.

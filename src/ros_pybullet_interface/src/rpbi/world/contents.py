@@ -1,4 +1,4 @@
-"""The bodies, cameras and attachments of a world, and the log from which the world can be rebuilt."""
+"""The bodies, cameras and attachments of a world, and the load log from which the world can be rebuilt."""
 
 import hashlib
 import struct
@@ -66,7 +66,7 @@ def _make(body: Body, config: Any) -> Sensor:
 
 
 class WorldContents:
-    """The bodies and cameras of a world with their sensors and inputs, and the log from which the world can be rebuilt.
+    """The bodies and cameras of a world with their sensors and inputs, and the world's load log.
 
     Attributes:
         bodies: Bodies, indexed by name.
@@ -76,7 +76,7 @@ class WorldContents:
         sensors: Schedule of all sensors.
         contacts: Reader of the contacts between bodies.
         attachments: Attachments between bodies.
-        log: Log of all changes of bodies and physics.
+        log: Load log: all changes of bodies and physics, from which the world can be rebuilt.
     """
 
     def __init__(self, pb: Client, clock: Clock, world: SensedWorld) -> None:
@@ -167,7 +167,7 @@ class WorldContents:
         self._append(LogEntry("", "physics", change))
 
     def clear(self) -> None:
-        """Removes attachments, bodies, scheduled sensors and the log.
+        """Removes attachments, bodies, scheduled sensors and all entries of the load log.
 
         Cameras and inputs remain until `fill` or `rebuild` replaces them.
         """
@@ -299,7 +299,10 @@ class WorldContents:
             raise ConfigError([Problem(file or name, "name", message)])
 
     def _append(self, entry: LogEntry) -> None:
-        """Applies an entry to the world and logs the entry. All changes of bodies and physics use this method."""
+        """Applies an entry to the world and appends it to the load log.
+
+        All changes of bodies and physics use this method.
+        """
         self.contacts.invalidate()
         apply(self._pb, self.bodies, entry)
         self.log.append(entry)

@@ -68,7 +68,7 @@ def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[st
     """Replaces old spellings of keys, removes keys without effect, and logs a warning for each such key.
 
     Args:
-        section: `"main"`, or the key of the main file's list that contains the object's file.
+        section: `"main"` for the main file; for an object's file, the main file's key under which that file is listed.
         data: Content of the file; it is not changed.
         file: Name of the file, for messages.
 

@@ -118,7 +118,7 @@ def parse_section(
     """Validates a mapping and returns it as a model; accepts old spellings of keys.
 
     Args:
-        section: `"main"`, or the key of the main file's list that contains the object.
+        section: `"main"` for the main file; for an object's file, the main file's key under which that file is listed.
         data: Content of the file; it is not changed.
         file: Name of the file, for messages.
         model: Model of the content.

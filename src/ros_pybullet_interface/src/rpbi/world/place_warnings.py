@@ -23,11 +23,11 @@ MAX_NAMES = 3
 FAR_M = 100.0
 """Largest plausible coordinate of a position [m]; a larger one was probably given in millimetres."""
 TOUCHING_M = 1e-3
-"""Depth up to which overlapping bodies count as touching [m], since PyBullet adds margins to meshes."""
+"""Depth [m] up to which overlapping bodies count as touching, since PyBullet adds margins to meshes."""
 HANGING_M = 0.02
-"""Smallest gap below a body of mass 0 for a warning that the body hangs in the air [m]."""
+"""Smallest gap [m] below a body of mass 0 for a warning that the body hangs in the air."""
 MAX_FALL_M = 100.0
-"""Largest height above a plane from which a body is expected to fall onto the plane [m]."""
+"""Largest height [m] above a plane from which a body is expected to fall onto the plane."""
 LEVEL = 0.9999
 """Cosine of the largest slope at which a surface counts as level."""
 PLANE_ADVICE = (

@@ -22,7 +22,7 @@ MAX_LOGGED = 1_000
 MAX_FREE = 1
 """Maximum number of free bodies for a fast reset; worlds with more free bodies are always built again."""
 APART_M = 1_000.0
-"""Distance between the bases of bodies at which bodies certainly do not touch [m]."""
+"""Distance [m] between the bases of bodies at which bodies certainly do not touch."""
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 UNDONE = ("halt", "pause", "move", "stop_motion", "set_joint_state")
 """Kinds of commands whose effects are undone by restoring the state, for all command values."""

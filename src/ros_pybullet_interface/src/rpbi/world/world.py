@@ -99,7 +99,7 @@ class World:
         """Number of resets since the world was built."""
         self._shadow: Shadow | None = None
         self.physics_s = 0.0
-        """Total wall time that PyBullet's steps took [s]."""
+        """Total wall time [s] that PyBullet's steps took."""
         self.loaded = loaded
         """Configuration from which the world was built, and is built again at a reset."""
         connect = self.config.connect.kwargs()
@@ -322,7 +322,7 @@ class World:
         Args:
             name: Name of the sensor's body, or of the camera.
             number: Index of the sensor in `sensors_of(name)`.
-            hz: New rate in simulated time [Hz]; 0 switches the sensor off.
+            hz: New rate [Hz] in simulated time; 0 switches the sensor off.
 
         Raises:
             UnknownNameError: If no body or camera has this name.
@@ -482,7 +482,7 @@ class World:
 
         Args:
             ticks: Maximum number of ticks.
-            end_s: Time of `time.monotonic` at which to stop [s].
+            end_s: Time [s] of `time.monotonic` at which to stop.
 
         Returns:
             Number of ticks by which the world has advanced.

@@ -21,13 +21,13 @@ from .world import World
 CONCAVE_SHARE = 0.05
 """Largest increase of a mesh's volume by its convex hull without a warning, relative to the mesh's volume."""
 HALF_TURN, FULL_TURN = 3.2, 6.4
-"""Angles slightly above a half turn and a full turn [rad], to allow for rounded values."""
+"""Angles [rad] slightly above a half turn and a full turn, to allow for rounded values."""
 ROUND = 0.01
 """Largest distance of an angle from a multiple of 15 degrees [15 degrees] at which the angle counts as round."""
 FRACTIONS = 3
 """Smallest number of non-integer angles at which a robot's angles, if all up to a half turn, are taken for radians."""
 LARGEST_LIMIT, LARGEST_DEG = 12.6, 360.0
-"""Largest plausible limit of a revolute joint [rad], and largest limit that may be degrees; larger means no limit."""
+"""Largest plausible limit [rad] of a revolute joint, and largest limit that may be degrees; larger means no limit."""
 ARM_JOINTS = 4
 """Smallest number of joints in a chain at which a robot with a single joint on its base counts as an arm."""
 
@@ -94,7 +94,7 @@ def _moving_no_mass(document: UrdfDocument) -> list[str]:
 
 
 def _joints_below(document: UrdfDocument) -> dict[str, list[Edge]]:
-    """Returns the joints whose parent is the link, for each link with such joints; indexed by the link's name."""
+    """Returns, for each link that is the parent of joints, these joints; indexed by the link's name."""
     below: dict[str, list[Edge]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge)
@@ -215,7 +215,7 @@ def _are_radians(angles: Sequence[float]) -> bool:
 
 
 def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> Iterator[Problem]:
-    """Yields a warning for the first `rpy` angle and the first joint limit of a URDF that look like degrees."""
+    """Yields a warning for a URDF's first `rpy` angle that looks like degrees, and for the first such joint limit."""
     key, expected = "loadURDF.fileName", "looks like degrees: expected [rad]"
     for owner, tag, name, text, _ in document.attributes():
         if (tag, name) == ("origin", "rpy") and any(FULL_TURN < abs(n) <= LARGEST_DEG for n in numbers_in(text)):

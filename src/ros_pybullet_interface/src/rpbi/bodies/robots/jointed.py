@@ -25,10 +25,10 @@ from .robot_config import RobotConfig
 log = logging.getLogger(__name__)
 
 START_TOLERANCE = 1e-3
-"""Largest difference between a mimic joint's configured and actual start position [rad or m]; beyond it, a warning is
+"""Largest difference [rad or m] between a mimic joint's configured and actual start position; beyond it, a warning is
 logged."""
 DEFAULT_BASE_STATE_HZ = 50.0
-"""Default rate of the base state of a robot whose base is not fixed [Hz]."""
+"""Default rate [Hz] of the base state of a robot whose base is not fixed."""
 
 
 class JointedBody(Body):
@@ -201,7 +201,7 @@ class JointedBody(Body):
 
         Args:
             follower: The mimic joint.
-            position: The actual start position, computed from the mimicked joint [rad or m].
+            position: The actual start position [rad or m], computed from the mimicked joint.
         """
         configured = self._start_of(follower)
         if follower.name in self.config.initial_joint_position and abs(configured - position) > START_TOLERANCE:

@@ -28,7 +28,7 @@ class PoseTarget(NamedTuple):
 
     Attributes:
         pose: Position of the point and orientation of the link, in the world frame.
-        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+        stamp_ns: Time [ns] of sending by the sender's clock; 0 if unknown.
     """
 
     pose: Pose
@@ -141,7 +141,7 @@ class CartesianImpedanceController(Controller):
         return dict(zip(names, numbers))
 
     def _damping(self, mobility: Array) -> Array:
-        """Returns the damping along each axis of the springs, shape (6,) [N s/m, N m s/rad]."""
+        """Returns the damping [N s/m, N m s/rad] along and about each axis of the springs, shape (6,)."""
         damping: Array = self._critical / np.sqrt(np.maximum(mobility.diagonal(), LEAST_MOBILITY))
         return damping
 

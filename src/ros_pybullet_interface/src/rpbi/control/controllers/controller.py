@@ -33,8 +33,8 @@ class RobotState(NamedTuple):
 
     Attributes:
         base: Pose of the root link in the world frame.
-        position: Positions of all n driven joints [rad or m], in the order of `RobotDynamics.joints`.
-        velocity: Velocities of the same joints, in the same order [rad/s or m/s].
+        position: Positions [rad or m] of all n driven joints, in the order of `RobotDynamics.joints`.
+        velocity: Velocities [rad/s or m/s] of the same joints, in the same order.
         base_twist: Twist of the root link in the world frame; zero for a fixed base.
     """
 
@@ -48,7 +48,7 @@ class SetPoints(NamedTuple):
     """Joint positions that a controller commands; PyBullet's motors move the joints to these positions within a tick.
 
     Attributes:
-        position: Positions of the controller's m joints at the end of the tick [rad or m], shape (m,).
+        position: Positions [rad or m] of the controller's m joints at the end of the tick, shape (m,).
     """
 
     position: Array
@@ -123,7 +123,7 @@ class Controller(ABC):
 
     @abstractmethod
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array | SetPoints:
-        """Computes the commands of one tick: the efforts [N m or N] of the m joints, shape (m,), or set points.
+        """Computes one tick's commands: efforts [N m or N] of the controller's m joints, shape (m,), or set points.
 
         Args:
             state: State of the robot before the tick.

@@ -33,10 +33,10 @@ class ForceControllerConfig(CartesianImpedanceConfig):
 
 
 class ForceController(CartesianImpedanceController):
-    """Pushes along an axis with a given force, and pulls a point to a target pose in all other directions.
+    """Pushes along an axis with a configured force, and pulls a point to a target pose in all other directions.
 
-    A damper along the axis limits the speed without contact. Once the point rests in contact, the configured force
-    acts. The target's position along the axis is ignored.
+    While the point is not in contact, a damper along the axis limits the speed. Once the point rests in contact, the
+    configured force acts. The target's position along the axis is ignored.
     """
 
     Config = ForceControllerConfig

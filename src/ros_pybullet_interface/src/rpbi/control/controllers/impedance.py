@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 
 DampingRatio = Annotated[float, Field(ge=0.0, le=2.0)]
 SMOOTHED_S = 0.01
-"""Time constant of the low-pass filter on the estimated disturbance [s]."""
+"""Time constant [s] of the low-pass filter on the estimated disturbance."""
 _EYE = np.eye(6)
 ROUNDING = 1e-6 * np.eye(6)
 """Added to the mobility matrix so that the matrix is invertible at singular arm configurations."""
@@ -74,7 +74,7 @@ class Disturbance:
 
     def __init__(self, count: int, dt_s: float) -> None:
         self.estimate = np.zeros(count)
-        """Estimated accelerations of the n joints [rad/s^2 or m/s^2], smoothed by a first-order filter."""
+        """Estimated accelerations [rad/s^2 or m/s^2] of the n joints, smoothed by a first-order filter."""
         self._dt_s = dt_s
         self._share = (1.0 - math.exp(-dt_s / SMOOTHED_S)) / dt_s
         self._predicted: Array | None = None
@@ -92,8 +92,8 @@ class Disturbance:
         """Predicts the velocities at the end of a tick, for the next `update`.
 
         Args:
-            velocity: n velocities before the tick [rad/s or m/s].
-            acceleration: n expected accelerations during the tick, including the estimate [rad/s^2 or m/s^2].
+            velocity: n velocities [rad/s or m/s] before the tick.
+            acceleration: n expected accelerations [rad/s^2 or m/s^2] during the tick, including the estimate.
         """
         self._predicted = velocity + self._dt_s * acceleration
 
@@ -130,7 +130,7 @@ class JointImpedance:
             error: n position errors, desired minus measured [rad or m].
             velocity: n measured velocities [rad/s or m/s].
             wanted_velocity: n desired velocities [rad/s or m/s].
-            push: n efforts to add, or one effort to add at all joints [N m or N].
+            push: n efforts [N m or N] to add, or one effort [N m or N] to add at all joints.
         """
         self._disturbance.update(velocity)
         external = mass @ self._disturbance.estimate
@@ -150,7 +150,7 @@ def implicit(mass: Array, stiffness: Array, damping: Array, forces: Array, veloc
         stiffness: n stiffnesses [N m/rad or N/m].
         damping: n dampings [N m s/rad or N s/m].
         forces: n efforts [N m or N] at zero velocity, including the efforts of the springs.
-        velocity: n velocities before the tick [rad/s or m/s].
+        velocity: n velocities [rad/s or m/s] before the tick.
         dt_s: Length of the tick [s].
     """
     by_velocity = damping + stiffness * dt_s
@@ -169,7 +169,7 @@ def implicit_wrench(
         stiffness: 6 stiffnesses [N/m, N m/rad], along and about the axes of the springs.
         damping: 6 dampings [N s/m, N m s/rad], along and about the same axes.
         wrench: Force [N] and moment [N m] at zero velocity, shape (6,): the springs' wrench plus additional pushes.
-        acceleration: Velocity of the point divided by the length of a tick, plus the acceleration of the point by
+        acceleration: Velocity of the point divided by the length of a tick, plus the point's acceleration due to
             unmodelled effects [m/s^2, rad/s^2], shape (6,).
         dt_s: Length of the tick [s].
     """

@@ -87,7 +87,7 @@ class JointImpedanceController(Controller):
         return efforts + bias
 
     def report(self) -> Mapping[str, float]:
-        """Returns the position error of each joint [rad or m], desired minus measured."""
+        """Returns the position error [rad or m] of each joint, desired minus measured."""
         return {f"error/{joint.name}": float(error) for joint, error in zip(self._joints, self._error)}
 
     def _update_target(self, target: JointCommand | None, tick: int) -> None:

@@ -46,8 +46,8 @@ class JointTrajectory(NamedTuple):
 
         Args:
             current: The present trajectory, in the world's time.
-            start_s: The world's time at which this trajectory's times are 0 [s].
-            from_s: The world's time of the transition [s], before this trajectory's last point.
+            start_s: The world's time [s] at which this trajectory's times are 0.
+            from_s: The world's time [s] of the transition, before this trajectory's last point.
 
         Raises:
             TrajectoryRefusedError: If the joint cannot reach the next point in time within its limits.

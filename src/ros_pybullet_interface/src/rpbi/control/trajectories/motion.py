@@ -18,9 +18,9 @@ class TrajectoryMotion(Motion):
     Args:
         joints: The follower's joints, keyed by joint index.
         trajectories: One trajectory per joint in the world's time, keyed by joint index.
-        from_s: The world's time from which path tolerances are checked [s].
+        from_s: The world's time [s] from which path tolerances are checked.
         tolerances: Tolerances; None to check no tolerances.
-        stop_s: Duration of the stop after a tolerance was exceeded [s]; 0 stops at once.
+        stop_s: Duration [s] of the stop after a tolerance was exceeded; 0 stops at once.
 
     Attributes:
         code: Error code of the outcome, as in control_msgs/FollowJointTrajectoryResult.
@@ -146,7 +146,7 @@ class TrajectoryMotion(Motion):
 
 
 def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duration_s: float) -> Trajectory:
-    """Returns a trajectory on which a joint stops, with constant deceleration unless a position limit prevents it.
+    """Returns a trajectory on which a joint stops, with constant deceleration unless a position limit is in the way.
 
     The end position is clipped to the joint's limits.
 

@@ -78,7 +78,7 @@ class GoalTolerances(NamedTuple):
     Attributes:
         path: Tolerances before the end of the trajectory, keyed by joint name.
         goal: Tolerances at the end, keyed by joint name.
-        goal_time_s: Time allowed for reaching the goal after the trajectory's end [s]. 0 selects the configured time, a
+        goal_time_s: Time [s] allowed for reaching the goal after the trajectory's end. 0 selects the configured time, a
             negative number sets no limit.
     """
 
@@ -93,7 +93,7 @@ class Tolerances(NamedTuple):
     Attributes:
         path: Tolerances before the end of the trajectory, keyed by joint index.
         goal: Tolerances at the end, keyed by joint index.
-        goal_time_s: Time allowed for reaching the goal after the trajectory's end [s].
+        goal_time_s: Time [s] allowed for reaching the goal after the trajectory's end.
     """
 
     path: Mapping[int, JointTolerance]

@@ -48,7 +48,7 @@ class Segment(NamedTuple):
 
     Attributes:
         start_s: Start time [s].
-        origin_s: Time at which the argument of the polynomials is 0 [s], at or before `start_s`.
+        origin_s: Time [s] at which the argument of the polynomials is 0, at or before `start_s`.
         polynomials: One polynomial for each of n joints.
     """
 

@@ -41,16 +41,16 @@ class HandTask(WorldTask):
         return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of `WorldTask.parts`, then the position of the hand in the world frame [m]."""
+        """Yields the parts of `WorldTask.parts`, then the position [m] of the hand in the world frame."""
         yield from super().parts()
         yield ObservationPart("hand", self.config.low, self.config.high, self.hand)
 
     def hand(self) -> Vector:
-        """Returns the position of the hand link in the world frame [m]."""
+        """Returns the position [m] of the hand link in the world frame."""
         return self.world.bodies[self.config.robot].link_pose(self._link).position
 
     def position_of(self, name: str) -> Vector:
-        """Returns the position of a body's base in the world frame [m]."""
+        """Returns the position [m] of a body's base in the world frame."""
         return self.world.bodies[name].base_pose().position
 
     def touches(self, name: str) -> Sequence[tuple[str, float]]:

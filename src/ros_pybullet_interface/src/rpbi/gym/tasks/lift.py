@@ -55,7 +55,7 @@ class LiftTask(HandTask):
         super().reset(random)
 
     def lifted(self) -> float:
-        """Returns the height of the body above its start height [m]."""
+        """Returns the height [m] of the body above its start height."""
         return self.position_of(self.config.object)[2] - self._start_height
 
     def reward(self) -> float:

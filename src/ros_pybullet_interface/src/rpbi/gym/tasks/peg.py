@@ -49,7 +49,7 @@ class PegTask(HandTask):
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of `HandTask.parts`, then the vector from peg tip to hole opening, in world axes [m]."""
+        """Yields the parts of `HandTask.parts`, then the vector [m] from peg tip to hole opening, in world axes."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
 
@@ -63,7 +63,7 @@ class PegTask(HandTask):
         super().reset(random)
 
     def reward(self) -> float:
-        """Returns the negative distance between the tip and the target point in the hole [m]."""
+        """Returns the negative distance [m] between the tip and the target point in the hole."""
         return -math.dist(minus(self.hole, (0.0, 0.0, self.config.depth)), self.hand())
 
     def has_succeeded(self) -> bool:

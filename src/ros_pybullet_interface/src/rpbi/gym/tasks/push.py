@@ -47,7 +47,7 @@ class PushTask(HandTask):
         return [self.hand_action("xy")]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of `HandTask.parts`, then the pose of the body, then x and y of the goal [m]."""
+        """Yields the parts of `HandTask.parts`, then the pose of the body, then x and y [m] of the goal."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
         yield ObservationPart("goal", self.config.goal_low[:2], self.config.goal_high[:2], lambda: self.goal)
@@ -59,7 +59,7 @@ class PushTask(HandTask):
         super().reset(random)
 
     def distance(self) -> float:
-        """Returns the horizontal distance between body and goal [m]."""
+        """Returns the horizontal distance [m] between body and goal."""
         return math.dist(self.goal, self.position_of(self.config.object)[:2])
 
     def reward(self) -> float:

@@ -50,7 +50,7 @@ class ReachTask(WorldTask):
         return [JointAction(self.world, config.robot, config.joints, config.speed, self.period_s)]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of `WorldTask.parts`, then the vector from the link to the goal, in world axes [m]."""
+        """Yields the parts of `WorldTask.parts`, then the vector [m] from the link to the goal, in world axes."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
 
@@ -61,12 +61,12 @@ class ReachTask(WorldTask):
         super().reset(random)
 
     def position(self) -> Vector:
-        """Returns the position of the link in the world frame [m]."""
+        """Returns the position [m] of the link in the world frame."""
         position: Vector = self.world.bodies[self.config.robot].link_pose(self._link).position
         return position
 
     def reward(self) -> float:
-        """Returns the negative distance between link and goal [m]."""
+        """Returns the negative distance [m] between link and goal."""
         return -math.dist(self.goal, self.position())
 
     def has_succeeded(self) -> bool:

@@ -60,7 +60,7 @@ class WipeTask(HandTask):
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of `HandTask.parts`, the force on the surface [N], and for each cell 1 if wiped, else 0."""
+        """Yields the parts of `HandTask.parts`, the force [N] on the surface, and for each cell 1 if wiped, else 0."""
         yield from super().parts()
         yield ObservationPart("force", (0.0,), (LARGEST_FORCE_N,), lambda: (self.force(),))
         count = len(self.cells)
@@ -73,7 +73,7 @@ class WipeTask(HandTask):
         super().reset(random)
 
     def force(self) -> float:
-        """Returns the normal force of the robot on the surface [N] in the last tick."""
+        """Returns the normal force [N] of the robot on the surface in the last tick."""
         return sum(force for other, force in self.touches(self.config.surface) if other == self.config.robot)
 
     def after_tick(self) -> None:

@@ -29,7 +29,7 @@ QUEUE_SIZE = 2
 RECORDER_QUEUE_SIZE = 100
 """Largest number of images buffered for a recorder, the same as in `rosbag record`."""
 LONGEST_WAIT_S = 5.0
-"""Longest wait for the connections of subscribers that are registered at the ROS master [s]."""
+"""Longest wait [s] for the connections of subscribers that are registered at the ROS master."""
 
 
 class ImagePublisher:

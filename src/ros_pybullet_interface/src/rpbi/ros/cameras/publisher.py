@@ -24,7 +24,7 @@ from rpbi.world import World
 from .image_publisher import SINK, camera_node, sink_arguments
 
 LONGEST_WAIT_S = 20.0
-"""Longest wait of the world for a synchronous camera [s] of wall time; beyond it, the world stops."""
+"""Longest wall time [s] that the world waits for a synchronous camera; beyond it, the world stops."""
 
 
 class ScenePublisher:

@@ -58,7 +58,10 @@ class CommandPublisher:
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends a message with new commands to all subscribers, and one with earlier ones to each new subscriber."""
+        """Sends a message with new commands to all subscribers.
+
+        Also sends a message with earlier commands to each new subscriber that does not have all commands yet.
+        """
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())

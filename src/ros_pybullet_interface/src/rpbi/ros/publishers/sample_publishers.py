@@ -178,7 +178,7 @@ class TickPublisher:
             self._publishers.publish(samples, self._world.clock.stamp_ns)
 
     def publish_time(self) -> None:
-        """Publishes the time, if it has changed and a message is due."""
+        """Publishes the world's time on /clock, if the time has changed and a message is due."""
         if self._clock is not None:
             self._clock.publish_tick()
 

@@ -211,7 +211,7 @@ class StatusPublisher:
         self._diagnostics.publish(message)
 
     def _warn_of_cause(self, message: str, load: Load) -> None:
-        """Logs why the world has been too slow for SLOW_PERIODS diagnostics in a row, once for each cause."""
+        """If the world was too slow in the last SLOW_PERIODS diagnostics, logs the cause, but only once per cause."""
         if self._slow_periods < SLOW_PERIODS or WINDOW_ADVICE in self._advice:
             return
         reason, window = load.reason(self._clock.dt_s), self._world.window

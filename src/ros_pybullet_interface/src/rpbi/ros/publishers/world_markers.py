@@ -97,7 +97,7 @@ class WorldMarkers:
 
     Args:
         world: The world.
-        hz: Rate of the checks [Hz] of wall time.
+        hz: Rate [Hz] of the checks, in wall time.
     """
 
     def __init__(self, world: World, hz: float) -> None:

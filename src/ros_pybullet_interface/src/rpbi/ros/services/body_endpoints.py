@@ -60,9 +60,9 @@ from .trajectory_commands import follow_command, followers, query_state
 SAMPLES = 100
 """Number of force-torque samples whose mean becomes the new zero."""
 LOOK_AGAIN_AFTER_S = 0.2
-"""Period of checks whether the sensor still takes samples [s] of wall time."""
+"""Period [s], in wall time, of checks whether the sensor still takes samples."""
 LONGEST_ZEROING_S = 60.0
-"""Longest wait for all samples [s] of wall time; beyond it, zeroing fails and the old zero stays."""
+"""Longest wait [s], in wall time, for all samples; beyond it, zeroing fails and the old zero stays."""
 
 
 def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:

@@ -140,7 +140,10 @@ def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, g
 
 
 def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Advances by many ticks as `rpbi/step_n` does, and applies inputs of the request before given ticks."""
+    """Advances the world by several ticks, as `rpbi/step_n` does.
+
+    Applies each input of the request before the tick that the request gives for the input.
+    """
     waiting = sorted(map(planned_input, request.inputs), key=lambda each: each.tick)
     if waiting and waiting[-1].tick >= max(request.steps, 1):
         raise InterfaceError(f"{waiting[-1].slot}: expected a tick below {request.steps}, got {waiting[-1].tick}")
@@ -318,7 +321,7 @@ def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answe
 
 
 def _set_sensor_rate(node: NodeContext, request: SetSensorRateRequest) -> Answer:
-    """Changes the rate of a sensor [Hz] until the next reset; 0 turns the sensor off."""
+    """Changes the rate [Hz] of a sensor until the next reset; 0 turns the sensor off."""
     world, wanted = node.simulation.world, request.sensor.removeprefix("/").removeprefix("rpbi/")
 
     def change() -> float:

@@ -42,12 +42,13 @@ class Predictor:
 
     A second process, the shadow, repeats the simulation of the world up to the present tick and predicts from there.
     The first prediction simulates all ticks since the world was built or reset, or since its last keyframe. Later
-    predictions simulate only the ticks since the previous prediction.
+    predictions simulate only the ticks since the previous prediction. A request contains one or more candidates, which
+    are alternative sequences of inputs; each candidate is simulated separately.
 
     Args:
         simulation: The loop that runs the world.
         ask: Makes the simulation thread call a function.
-        max_ticks: Maximum number of ticks in a request, summed over all candidates.
+        max_ticks: Maximum number of ticks in a request, summed over all candidates of the request.
     """
 
     def __init__(self, simulation: Simulation, ask: Requests, max_ticks: int = MAX_TICKS) -> None:
@@ -64,7 +65,7 @@ class Predictor:
         """Predicts the motion for each candidate, and waits for the results.
 
         Args:
-            candidates: Alternative sequences of inputs.
+            candidates: Alternative sequences of inputs, each of which is simulated from the present state.
             job: Length of the predictions and the values to return.
 
         Returns:
@@ -107,7 +108,8 @@ class Predictor:
         """Makes the shadow simulate up to the world's present state.
 
         Args:
-            cancels: Number of cancellations when the prediction was requested; an increase ends the prediction.
+            cancels: Number of calls of `cancel` before the prediction was requested. If `cancel` has been called since,
+                the prediction ends.
 
         Returns:
             The shadow, and the tick and stamp [ns] that it has reached.

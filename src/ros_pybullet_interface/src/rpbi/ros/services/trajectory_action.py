@@ -37,7 +37,7 @@ ACTION = Service(f"rpbi/{{name}}/{CONTROLLER}/follow_joint_trajectory", FollowJo
 MAX_TASKS = 100
 """Largest number of tasks that wait for the action's thread; beyond it, feedback is dropped."""
 LONGEST_END_S = 5.0
-"""Longest wait for the answers to all goals when the action is closed [s]."""
+"""Longest wait [s] for the answers to all goals when the action is closed."""
 
 
 class StampedActionServer(ActionServer):

@@ -13,7 +13,7 @@ class ContactArrowsSensor(Sensor):
     """Reports the contact forces that acted on a body in the last tick, as arrows.
 
     Args:
-        metres_per_newton: Length of the arrow for a force of 1 N [m/N].
+        metres_per_newton: Length [m/N] of the arrow for a force of 1 N.
     """
 
     sample_type = ContactArrowsSample

@@ -35,7 +35,7 @@ from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 log = logging.getLogger(__name__)
 
 SURFACE_M = 0.005
-"""Largest depth of a visible tag below a body's surface [m]; deeper ones are hidden."""
+"""Largest depth [m] of a visible tag below a body's surface; deeper ones are hidden."""
 
 
 class TagConfig(ConfigModel):

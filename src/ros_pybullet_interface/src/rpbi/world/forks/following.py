@@ -125,7 +125,10 @@ def _words(error: Exception) -> str:
 
 
 def _predict_all(world: Any, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> Iterator[Prediction]:
-    """Makes the prediction of each candidate in a separate fork, and yields it; at most `jobs` forks run at a time."""
+    """Makes a prediction for each candidate (sequence of inputs) in a separate fork, and yields the prediction.
+
+    At most `jobs` forks run at a time.
+    """
     waiting = list(enumerate(candidates))
     answers: dict[int, list[bytes]] = {}
     running: dict[int, int] = {}

@@ -57,9 +57,9 @@ class Prediction(NamedTuple):
         state_hash: Hash of the state at the end, see `World.state_hash`.
         ticks: Ticks of the samples, counted from the start of the prediction, shape (n,).
         poses: For each body, positions [m] and quaternions (x, y, z, w) of the base in the world frame, shape (n, 7).
-        joints: For each robot, positions of the moving joints [rad or m] in the order of the joint model, shape
+        joints: For each robot, positions [rad or m] of the moving joints in the order of the joint model, shape
             (n, number of joints).
-        contacts: For each body, sum of the normal forces of all contacts [N], shape (n,).
+        contacts: For each body, sum of the normal forces [N] of all contacts, shape (n,).
         fault: Reason why the prediction failed; empty if it succeeded.
     """
 

@@ -243,7 +243,8 @@ class Shadow:
     def restore(self, state: WorldState, commands: int) -> None:
         """Makes the shadow restore a state, without waiting for the result.
 
-        This is needed after a keyframe, which drops earlier commands that the shadow may not have.
+        This is needed after the world has made a keyframe: the world then drops all earlier commands. The shadow cannot
+        reach the world's present state if it has not received some of these commands.
 
         Args:
             state: Present state of the world.
@@ -257,7 +258,10 @@ class Shadow:
 
     @property
     def is_copy(self) -> bool:
-        """Whether the shadow is a fork of this process: making a new fork is then faster than restoring a state."""
+        """Whether the shadow is a fork of this process.
+
+        If so, replacing the shadow by a new fork is faster than making the shadow restore a state.
+        """
         return isinstance(self._process, _Copy)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
@@ -286,7 +290,7 @@ class Shadow:
         return forks
 
     def predict(self, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
-        """Makes a prediction for each candidate; at most `jobs` processes run at a time."""
+        """Makes a prediction for each candidate (sequence of inputs); at most `jobs` processes run at a time."""
         return list(self._remote.ask("predict", [list(each) for each in candidates], job, jobs))
 
     def kill(self) -> None:

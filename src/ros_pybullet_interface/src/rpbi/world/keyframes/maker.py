@@ -22,10 +22,10 @@ class KeyframeMaker:
 
     Args:
         world: The world.
-        every_s: Period of keyframes in simulated time [s]; 0 means no periodic keyframes.
+        every_s: Period [s] of keyframes in simulated time; 0 means no periodic keyframes.
 
     Attributes:
-        longest_s: Maximum wall time that a part of the last keyframe took [s].
+        longest_s: Maximum wall time [s] that a part of the last keyframe took.
     """
 
     def __init__(self, world: Any, every_s: float) -> None:

@@ -14,7 +14,7 @@ from rpbi.bodies import Body
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 
 _UNUSUAL_GRAVITY = (1.0, 2.0, 30.0)
-"""Gravity that visibly moves every body that does not sleep [m/s^2]."""
+"""Gravity [m/s^2] that visibly moves every body that does not sleep."""
 
 
 class BodyMotion(NamedTuple):
@@ -26,8 +26,8 @@ class BodyMotion(NamedTuple):
         linear: Linear velocity of the base [m/s].
         angular: Angular velocity of the base [rad/s].
         joints: PyBullet's indices of all joints that are not fixed.
-        positions: Position of each joint in `joints` [rad or m]; for a spherical joint, a quaternion.
-        velocities: Velocity of each joint in `joints` [rad/s or m/s].
+        positions: Position [rad or m] of each joint in `joints`; for a spherical joint, a quaternion.
+        velocities: Velocity [rad/s or m/s] of each joint in `joints`.
     """
 
     position: Vector
