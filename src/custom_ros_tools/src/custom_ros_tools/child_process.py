@@ -14,13 +14,13 @@ def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) 
     """Starts a child process that gets a signal when this process ends, even if this process is killed.
 
     The child's standard input is a pipe that this process holds open. The kernel sends the signal when this process
-    ends, or closes `stdin` of the returned process (`F_SETSIG` of fcntl(2)). `PR_SET_PDEATHSIG` is not used for two
-    reasons. It sends the signal as soon as the thread that started the child ends. It also needs code between fork and
-    exec, which is unsafe in a process with several threads.
+    ends, or closes `stdin` of the returned process (`F_SETSIG` of fcntl(2)). The alternative `PR_SET_PDEATHSIG` would
+    send the signal as soon as the thread that started the child ends. It would also need code between fork and exec,
+    which is unsafe in a process with several threads.
 
     Args:
-        command: The command line.
-        at_end: The signal.
+        command: Program and arguments of the child.
+        at_end: The signal that the child gets.
         options: Options of `subprocess.Popen`, except `stdin`.
 
     Raises:
@@ -42,9 +42,9 @@ def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) 
 
 
 def kill_with_children(process: subprocess.Popen) -> None:
-    """Kills a process and its children with their process groups, and waits for the end of the process.
+    """Kills the process groups of a process and of its children, and waits for the end of the process.
 
-    The process and each child must lead a process group of their own, like `roslaunch` and its nodes.
+    The process and each child must be the leaders of separate process groups, like `roslaunch` and its nodes.
     """
     for pid in (process.pid, *_children(process.pid)):
         with contextlib.suppress(ProcessLookupError):
@@ -60,7 +60,7 @@ def is_stopped(process_id: int) -> bool:
 
 
 def _children(parent: int) -> list[int]:
-    """Returns the ids of a process's children; see proc_pid_stat(5)."""
+    """Returns the process ids of a process's children; see proc_pid_stat(5)."""
     children = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):  # the process has just ended

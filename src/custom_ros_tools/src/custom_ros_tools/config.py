@@ -26,7 +26,7 @@ MAX_VALUES = 1_000_000
 Values that aliases (`*NAME`) repeat are counted each time.
 """
 MAX_NUMBER_LENGTH = 1000
-"""Largest number of characters of a number. A longer scalar without a tag is read as a text."""
+"""Largest number of characters in a number. A longer scalar without a tag is read as text."""
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
@@ -51,9 +51,9 @@ def ros_package_path(package: str) -> str:
 
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
-    """Returns the index of the packages for one value of ROS_PACKAGE_PATH.
+    """Returns the index of the ROS packages for a value of ROS_PACKAGE_PATH.
 
-    Cached, since each search reads all folders.
+    The result is cached, since making the index reads all folders.
     """
     is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # false if this package is installed
     return rospkg.RosPack([*rospkg.get_ros_paths(), *([str(_SOURCES)] if is_source else [])])
@@ -63,7 +63,7 @@ def replace_package(path: str) -> str:
     """Replaces the first `{package}` or `package://package` in a path by the folder of the ROS package.
 
     Returns:
-        The path; unchanged if it does not contain a package.
+        The new path; a path that does not contain a package is unchanged.
 
     Raises:
         ConfigError: If the package is not found.
@@ -78,8 +78,8 @@ def replace_package(path: str) -> str:
 def read_file(path: str | Path, most_bytes: int | None = None) -> bytes:
     """Reads an ordinary file.
 
-    Refuses pipes and devices, since reading them might block or never end. Files in /proc report the size 0, and are
-    read as empty.
+    Refuses pipes and devices, since reading them might block or never end. Files in /proc are read as empty, since they
+    report the size 0.
 
     Args:
         path: The file.
@@ -109,7 +109,7 @@ def load_config(path: str, most_bytes: int = MAX_BYTES) -> dict[str, Any]:
         most_bytes: Largest size of the file.
 
     Raises:
-        ConfigError: If the file cannot be read or is not a YAML mapping; the error names file, line and column.
+        ConfigError: If the file cannot be read or is not a YAML mapping; the message names file, line and column.
     """
     try:
         text = read_file(replace_package(path), most_bytes).decode()
@@ -127,7 +127,7 @@ def load_configs(s: str, file: str = "text", most_characters: int = MAX_BYTES) -
 
     Args:
         s: The text.
-        file: Name of the text in messages.
+        file: Name of the text in error messages.
         most_characters: Largest length of the text.
 
     Raises:
@@ -153,13 +153,13 @@ def load_configs(s: str, file: str = "text", most_characters: int = MAX_BYTES) -
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Converts a mapping of plain data to a YAML text, which `load_configs` can read; keeps the order of the keys."""
+    """Converts a mapping of plain data to a YAML text, which `load_configs` can read. The order of keys is kept."""
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 
 @contextmanager
 def _without_collections() -> Iterator[None]:
-    """Switches off garbage collection in a context, since collecting many new objects would block all threads."""
+    """Switches off garbage collection within a context, since collecting many new objects would block all threads."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -195,7 +195,7 @@ class _StrictLoader(yaml.SafeLoader):
             _dismantle(node)
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """Reads a very long scalar as a text, since matching it with PyYAML's patterns would block all threads."""
+        """Reads a very long scalar as text, since matching it with PyYAML's patterns would block all threads."""
         if kind is yaml.ScalarNode and len(value) > MAX_NUMBER_LENGTH:
             implicit = (False, True)
         return super().resolve(kind, value, implicit)
@@ -238,7 +238,7 @@ def _size(node: yaml.Node, known: dict[int, int]) -> int:
 
     Args:
         node: The node.
-        known: Known counts by the id of the node; 0 for nodes that are being counted.
+        known: Known counts, indexed by `id` of the node; 0 for nodes whose counting has not ended.
 
     Raises:
         yaml.YAMLError: If a node contains itself.

@@ -1,7 +1,7 @@
 """Error classes of the workspace, which all derive from `InterfaceError`.
 
-The class says who has to act, such as the author of a configuration. Most errors store data, and compose the message
-from the data.
+The class of an error tells who can correct the fault, such as the author of a configuration. Most errors store data,
+from which they compose the message.
 """
 
 import difflib
@@ -23,7 +23,7 @@ def shortened(text: str) -> str:
 
 
 def bounded(text: str) -> str:
-    """Cuts a message to at most 100 lines with about 2,000 characters each, even if it quotes long input."""
+    """Cuts a message to at most 100 lines with about 2,000 characters each."""
     lines = text.split("\n")
     kept = [line if len(line) <= MAX_LINE_LENGTH else f"{line[:MAX_LINE_LENGTH]}..." for line in lines[:MAX_LINES]]
     return "\n".join([*kept, f"... and {len(lines) - MAX_LINES} lines more"] if len(lines) > MAX_LINES else kept)
@@ -71,7 +71,7 @@ class Problem:
 
 
 class ConfigError(InterfaceError):
-    """A configuration is invalid, so that its author has to change it. `problems` has all faults that were found."""
+    """A configuration is invalid, and has to be changed by its author. `problems` lists all faults that were found."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -85,7 +85,7 @@ class UnknownNameError(InterfaceError):
     """The caller used an unknown name.
 
     Attributes:
-        kind: Kind of the named object, such as `"joint"`.
+        kind: Noun for the named object, such as `"joint"`.
         name: The unknown name.
         known: The known names.
     """
@@ -107,7 +107,7 @@ class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is th
 
     Attributes:
         package: Name of the library.
-        how: How to install it, such as a command to type.
+        how: Instructions to install the library, such as a command to type.
     """
 
     package: str
@@ -123,7 +123,7 @@ class PluginError(InterfaceError):
 
     Attributes:
         plugin: Name of the plug-in, as `module:Class`.
-        doing: The call that failed, such as `before_step`, if necessary with the name of an object.
+        doing: Name of the method that failed, such as `before_step`, if necessary with the name of an object.
         cause: The error as text, with file and line.
     """
 
@@ -136,19 +136,19 @@ class PluginError(InterfaceError):
 
 
 class PhysicsError(InterfaceError):
-    """PyBullet rejected a call that the configuration allows. The message has the request and PyBullet's message."""
+    """PyBullet rejected a call that the configuration allows. The message contains the call and PyBullet's message."""
 
 
 @contextmanager
 def collecting_problems() -> Iterator[Callable[[], AbstractContextManager[None]]]:
-    """Collects the problems of several parts of a configuration, so that they are reported together.
+    """Collects the problems of several parts of a configuration, so that all problems are reported together.
 
     Yields:
         A function that makes a context for one part: `with collecting_problems() as part`, then `with part(): ...`
         for each part.
 
     Raises:
-        ConfigError: At the end, if at least one part raised a ConfigError; it has the problems of all parts.
+        ConfigError: At the end, if at least one part raised a ConfigError. It contains the problems of all parts.
     """
     problems: list[Problem] = []
 

@@ -17,10 +17,10 @@ _NAME = re.compile(rf"{_PREFIX}[a-z]+-(?P<process>\d+)-\w+")
 def atomic_file(path: Path) -> Iterator[Path]:
     """Replaces a file atomically at the end of a context.
 
-    Yields a temporary path to write to. It has the same file name, in a hidden folder next to the file, so that
-    patterns such as `*.csv` do not match it. At the end of the context, the written file replaces the old file. If the
-    context fails, the written file is removed, and the old file does not change. Symbolic links at both paths are
-    replaced, not followed.
+    Yields a temporary path to write to: the same file name in a hidden folder next to the file, which patterns such as
+    `*.csv` do not match. At the end of the context, the written file replaces the old file. If the context raises an
+    error, the written file is removed, and the old file does not change. Symbolic links at both paths are replaced, not
+    followed.
     """
     folder = path.with_name(f".{path.name}.part")
     if folder.is_symlink():
@@ -35,7 +35,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
 
 def temporary_folder(kind: str) -> tempfile.TemporaryDirectory[str]:
-    """Makes a temporary folder, which exists until `cleanup` is called or the process ends.
+    """Makes a temporary folder, which exists until its method `cleanup` is called or the process ends.
 
     If a process is killed, its folder is removed when another process calls this function.
 

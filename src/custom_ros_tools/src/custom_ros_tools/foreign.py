@@ -19,11 +19,11 @@ MAX_PATH_BYTES = 1000
 MAX_DEPTH = 100
 """Largest nesting depth of lists and mappings in a foreign JSON text."""
 MAX_ENTRIES = 100_000
-"""Default of the largest number of entries in a foreign folder."""
+"""Largest number of entries in a foreign folder, by default."""
 
 
 def path_below(folder: str | Path, name: str) -> Path:
-    """Joins a trusted folder and a foreign path such that the result is inside the folder.
+    """Joins a trusted folder and a foreign path, and ensures that the result is inside the folder.
 
     Args:
         folder: The folder, which is trusted and may be a symbolic link.
@@ -55,7 +55,7 @@ def path_below(folder: str | Path, name: str) -> Path:
 
 
 def read_below(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> bytes:
-    """Reads a file inside a folder, given by a foreign path; see `path_below`.
+    """Reads the file that a foreign path inside a folder names; see `path_below`.
 
     Raises:
         ConfigError: If the path is invalid, or if the file is missing, too large, a symbolic link, a pipe or a device.
@@ -73,7 +73,7 @@ def entries_of(folder: str | Path, most: int = MAX_ENTRIES, *, links: bool = Fal
     Args:
         folder: The folder.
         most: Largest allowed number of returned entries.
-        links: Whether symbolic links are returned, too.
+        links: Whether the result includes symbolic links.
 
     Raises:
         OSError: If the folder cannot be read, or has more than `most` entries.
@@ -89,7 +89,7 @@ def entries_of(folder: str | Path, most: int = MAX_ENTRIES, *, links: bool = Fal
 
 
 def load_foreign_yaml(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> dict[str, Any]:
-    """Reads a mapping from a YAML file inside a folder, given by a foreign path.
+    """Reads a mapping from a YAML file that a foreign path inside a folder names.
 
     Raises:
         ConfigError: As for `path_below` and `load_config`.
@@ -102,12 +102,12 @@ def load_foreign_json(text: str | bytes, file: str, most_bytes: int = MAX_BYTES,
 
     Args:
         text: The text, or its bytes in UTF-8.
-        file: Source of the text, for messages.
+        file: Source of the text, for error messages.
         most_bytes: Largest length of the text.
         most_values: Largest number of values, counted over all levels.
 
     Raises:
-        ConfigError: If the text is not JSON, is too large, or has more than 100 levels.
+        ConfigError: If the text is not JSON, is too large, or is nested more than 100 levels deep.
     """
     try:
         if len(text) > most_bytes:
@@ -138,7 +138,7 @@ def printable_lines(text: str) -> str:
 
 
 _UNSAFE = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
-"""Unicode categories of unsafe characters: a terminal or an editor may interpret them as commands."""
+"""Unicode categories of unsafe characters, which a terminal or an editor may interpret as commands."""
 
 
 def _escaped(character: str) -> str:

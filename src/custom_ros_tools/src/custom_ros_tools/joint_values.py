@@ -1,4 +1,4 @@
-"""Checked joint values with names, as in a joint state, and conversions of their names and units."""
+"""Checked joint values with joint names, as in a joint state, and conversions of joint names and units."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class MissingJointsError(InterfaceError):
 
 @dataclass(frozen=True)
 class JointValues:
-    """Positions, velocities and efforts of n joints. Make it with `of`, which checks the values.
+    """Positions, velocities and efforts of n joints. Make objects with `of`, which checks the values.
 
     Attributes:
         names: n joint names; empty if the sender gave no names.
@@ -53,10 +53,10 @@ class JointValues:
         velocity: Iterable[float] | None = None,
         effort: Iterable[float] | None = None,
     ) -> JointValues:
-        """Checks values, and returns them as `JointValues`; None means that a quantity is not given.
+        """Checks values, and returns them as `JointValues`. None means that a quantity is not given.
 
         Raises:
-            ValueError: If lengths differ, a joint name is repeated, or a value is not finite.
+            ValueError: If lists differ in length, a joint name is repeated, or a value is not finite.
         """
         joints = tuple(names)
         if len(set(joints)) != len(joints):
@@ -79,7 +79,7 @@ class JointValues:
             ns: Prefix of the names in this object: joint `a` is called `ns/a`. By default, names have no prefix.
 
         Raises:
-            MissingJointsError: If joints are missing; the error names all of them.
+            MissingJointsError: If joints are missing; the error names all missing joints.
         """
         prefix = f"{ns.rstrip('/')}/" if ns else ""
         index = {name: i for i, name in enumerate(self.names)}
@@ -91,10 +91,10 @@ class JointValues:
         return JointValues(tuple(names), *(tuple(v[i] for i in picked) if v else () for v in quantities))
 
     def converted(self, conversions: Sequence[JointConversion]) -> JointValues:
-        """Converts names and values of some joints, and returns all joints in the same order.
+        """Converts names and values of some joints, and returns all joints in unchanged order.
 
         Raises:
-            MissingJointsError: If joints to convert are missing; the error names all of them.
+            MissingJointsError: If joints to convert are missing; the error names all missing joints.
             ValueError: If two joints get the same name, or a converted value is not finite.
         """
         if not conversions:
@@ -114,7 +114,7 @@ class JointValues:
 
 @dataclass(frozen=True)
 class JointConversion:
-    """Conversion of a joint's name and values between two systems, such as simulator and driver.
+    """Conversion of a joint's name and values from a source system to a target system, such as simulator and driver.
 
     A position q becomes `sign * factor * q + offset`. A velocity v becomes `sign * factor * v`. An effort e becomes
     `sign * e`.

@@ -1,4 +1,4 @@
-"""Models of the private parameters and of `~config` for the nodes of this package."""
+"""Pydantic models of `~config` and of the other private parameters of this package's nodes."""
 
 from __future__ import annotations
 
@@ -37,23 +37,23 @@ MARKER_TYPES = (
 MARKER_ACTIONS = ("ADD", "MODIFY", "DELETE", "DELETEALL")
 """Names of the constants for the field `action` of visualization_msgs/Marker."""
 SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
-"""Marker types that this configuration can describe completely. Other types need points or a text."""
+"""Marker types that `MarkerConfig` can describe completely. Other types need points or a text."""
 PER_SI_UNIT = {"rad": 1.0, "deg": 180.0 / math.pi, "m": 1.0, "mm": 1000.0}
-"""For each unit, how many of it make 1 rad or 1 m."""
+"""Number of each unit in 1 rad or 1 m."""
 
 
 def _in_any_case(names: Sequence[str]) -> WithJsonSchema:
-    """Makes the JSON Schema of constants that are accepted in any case; editors propose the lower-case spelling."""
+    """Makes the JSON Schema of constants in upper or lower case; editors propose the lower-case spelling."""
     usual = {"type": "string", "enum": [name.lower() for name in names]}
     return WithJsonSchema({"anyOf": [usual, {"type": "string", "pattern": "^[A-Za-z_]+$"}]})
 
 
 def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
-    """Makes a validator that accepts names of constants in any case, and converts them to upper case.
+    """Makes a validator that accepts names of constants in upper or lower case, and converts them to upper case.
 
     Args:
-        names: The constants.
-        kind: Word for the kind of constant in messages.
+        names: The constants in upper case.
+        kind: Noun for the constants in error messages.
     """
 
     def upper(name: str) -> str:
@@ -65,7 +65,7 @@ def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
 
 
 class MarkerNodeConfig(ConfigModel):
-    """Topic and rate at which a marker is published."""
+    """Topic and rate of a published marker, and whether its pose is broadcast on TF."""
 
     topic_name: TopicName = Field(description="Topic of the visualization_msgs/Marker.")
     hz: Hz = Field(50.0, description="Rate at which it is published, in wall time.")
@@ -134,7 +134,7 @@ class MarkerConfig(ConfigModel):
 
 
 class StartParameters(ConfigModel):
-    """Parameters of a node that is switched on and off."""
+    """Parameters of a node that can be switched on and off."""
 
     start_on_init: Switch = Field(False, description="Whether it is on from the start.")
 
@@ -146,7 +146,7 @@ class RateParameters(ConfigModel):
 
 
 class RemappedJoint(ConfigModel):
-    """Conversion of a joint position to a driver: `sign * factor of the unit * position + offset`."""
+    """Conversion of a joint from the simulator to a driver: `sign * factor of the unit * position + offset`."""
 
     joint: Text = Field(description="The joint in the simulator.")
     rename: Text | None = Field(None, description="Its name at the driver; by default the same.")
@@ -163,7 +163,7 @@ class RemappedJoint(ConfigModel):
 
 
 class StartWithin(ConfigModel):
-    """Condition for switching on: the robot must be near the first command, so that the robot does not jump."""
+    """Condition for switching a node on: the robot must be near the first command, so that it does not jump."""
 
     topic: Text = Field(description="Joint states of the commanded robot, in the names and units of the commands.")
     tolerance: Annotated[Positive, Unit("rad or m")] = Field(
@@ -172,7 +172,7 @@ class StartWithin(ConfigModel):
 
 
 class RemapConfig(ConfigModel):
-    """Selection and order of the forwarded joints, and their names and units at the receiver."""
+    """Selection and order of forwarded joints, and the joints' names and units at the receiver."""
 
     joint_names: ListOf[Text] | None = Field(
         None,
@@ -189,7 +189,7 @@ class RemapConfig(ConfigModel):
         return self
 
     def conversions(self) -> tuple[JointConversion, ...]:
-        """Makes the conversions of those forwarded joints whose name or unit changes."""
+        """Makes the conversions of all forwarded joints in `joints`, inverted if `inverse` is true."""
         there = (each.conversion() for each in self.joints)
         conversions = (each.inverse() if self.inverse else each for each in there)
         wanted = self.joint_names

@@ -1,4 +1,4 @@
-"""The class of all tables of plug-ins, such as solvers, tasks, sensors, controllers, devices and primitives."""
+"""The class of the tables of plug-ins, such as solvers, tasks, sensors, controllers, devices and primitives."""
 
 import ast
 import importlib.util
@@ -24,16 +24,16 @@ _Model = TypeVar("_Model", bound=ConfigModel)
 
 
 class PluginTable(Mapping[str, type[Plugin]]):
-    """Table of the plug-in classes of one kind, by name. A class is imported when it is looked up.
+    """Table of the plug-in classes of one kind, indexed by name. A class is imported when it is looked up.
 
     Users can write `module:Class`, for a class in their own package, wherever they can write a name from the table.
 
     Args:
-        kind: Noun for one plug-in in messages and documentation, such as `solver`.
-        base: Base class of the plug-ins, as `module:Class`. Classes in the table that do not derive from the base class
-            cannot be selected by name; only other code uses them.
-        paths: `module:Class` of each plug-in, by name.
-        suggests: Whether the message for an unknown name lists the known names.
+        kind: Noun for a plug-in in messages and documentation, such as `solver`.
+        base: Base class of the plug-ins, as `module:Class`. Users cannot select classes of the table that do not derive
+            from the base class; only other code uses these classes.
+        paths: `module:Class` of each plug-in, indexed by name.
+        suggests: Whether the error message for an unknown name lists the known names.
     """
 
     def __init__(self, kind: str, base: str, paths: Mapping[str, str], suggests: bool = True) -> None:
@@ -58,7 +58,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return cast(type[Plugin], pkgutil.resolve_name(self._base))
 
     def name_of(self, thing: Any) -> str:
-        """Returns the table's name for a class, or for an object's class; `module:Class` if the table lacks it."""
+        """Returns a class's name, or that of an object's class, in the table; `module:Class` if it is not there."""
         path = full_name(thing)
         return next((name for name, each in self._paths.items() if each == path), path)
 
@@ -71,7 +71,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
             name: A name in the table, or `module:Class`.
 
         Raises:
-            UnknownNameError: If the name is not in the table (only if the table `suggests`).
+            UnknownNameError: If the name is not in the table, and the argument `suggests` was true.
             UntrustedError: If the class belongs to a package that must not be imported.
             ValueError: If `module:Class` does not exist or cannot be imported, or does not derive from `base`.
             MissingDependency: If the class needs a library that is not installed.
@@ -89,8 +89,8 @@ class PluginTable(Mapping[str, type[Plugin]]):
 
         Args:
             name: A name in the table, or `module:Class`.
-            file: Path of the configuration file, for messages.
-            key: Key in the file whose value is the name, for messages.
+            file: Path of the configuration file, for error messages.
+            key: Key in the file whose value is the name, for error messages.
 
         Raises:
             UnknownNameError: If the name is not in the table.
@@ -106,18 +106,18 @@ class PluginTable(Mapping[str, type[Plugin]]):
     def make(
         self, name: str, data: Mapping[str, Any], file: str = "~", context: Mapping[str, Any] | None = None
     ) -> Plugin:
-        """Validates the options of a plug-in, and makes the plug-in. Its constructor must take only the options.
+        """Validates the options of a plug-in, and makes the plug-in. The constructor must only take the options.
 
         Args:
             name: A name in the table, or `module:Class`.
             data: Options of the plug-in, as read from YAML.
             file: Source of the options, for messages and relative paths; `"~"` for parameters of a node.
-            context: Further entries of the validation context, see `ConfigModel.parse`.
+            context: Additional entries of the validation context, see `ConfigModel.parse`.
 
         Raises:
             UnknownNameError: If the name is not in the table.
             MissingDependency: If the plug-in needs a library that is not installed.
-            ConfigError: If options are invalid; the error names file and key of each fault.
+            ConfigError: If options are invalid; the message names file and key of each fault.
         """
         make: Any = self.configured(name)
         return cast(Plugin, make(make.Config.parse(data, file, context)))
@@ -125,13 +125,13 @@ class PluginTable(Mapping[str, type[Plugin]]):
     # --- Configuration and schema
 
     def parse_entry(self, entry: Any, info: ValidationInfo, model: type[_Model], expected: str) -> _Model:
-        """Validates a YAML entry whose key `type` names a plug-in, using its `Config`; for pydantic validators.
+        """Validates a YAML entry whose key `type` names a plug-in, with the plug-in's `Config`; for use in validators.
 
         Args:
             entry: The entry as read from YAML; an instance of `model` is returned unchanged.
             info: Pydantic's information about the validation.
             model: Base class of the plug-ins' configurations.
-            expected: Words for an entry, for the error message if `entry` is not a mapping with a type.
+            expected: Description of a valid entry, for the error message if `entry` is not a mapping with a type.
 
         Raises:
             ValueError: If the entry is invalid.
@@ -152,7 +152,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
             raise InnerProblemsError(error.problems) from None
 
     def configs(self) -> dict[str, type[ConfigModel]]:
-        """Returns the plug-ins' option models by plug-in name; leaves out plug-ins with missing libraries."""
+        """Returns option models, indexed by plug-in name; leaves out plug-ins whose libraries are not installed."""
         found = {}
         for name in self:
             with suppress(MissingDependency):
@@ -160,18 +160,18 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return found
 
     def schemas(self) -> dict[str, Schema]:
-        """Returns the JSON Schemas of the plug-ins' options by plug-in name; see `configs`."""
+        """Returns the JSON Schemas of the option models, indexed by plug-in name; see `configs`."""
         return json_schemas(self.configs())
 
     # --- Documentation
 
     def summaries(self) -> dict[str, str]:
-        """Returns the first paragraph of each plug-in's docstring by plug-in name, without importing the modules."""
+        """Returns first paragraphs of docstrings, indexed by plug-in name, without importing the plug-ins' modules."""
         return {name: _summary(path) for name, path in self._paths.items()}
 
 
 def config_of(found: Any, base: type[_Model]) -> type[_Model]:
-    """Returns the option model of a plug-in class: its attribute `Config`.
+    """Returns the option model of a plug-in class, which is the class attribute `Config`.
 
     Args:
         found: The plug-in class.

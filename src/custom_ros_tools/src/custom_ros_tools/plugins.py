@@ -1,4 +1,4 @@
-"""Imports classes of other packages that are named as `module:Class`, and restricts such imports."""
+"""Imports classes that names of the form `module:Class` refer to, and restricts such imports."""
 
 import importlib
 import pkgutil
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from custom_ros_tools.errors import hint, shortened
 
 own_folders = [str(Path(__file__).parent)]
-"""Folders of the packages that look up and call plug-ins. `cause_of` reports the last line outside these folders."""
+"""Folders of the packages that look up and call plug-ins. `cause_of` reports the last code line outside the folders."""
 _used: set[str] = set()
 """Top-level packages from which `find_class` has returned a class."""
 
@@ -23,7 +23,7 @@ class _Trust(NamedTuple):
 
     Attributes:
         packages: Top-level packages that may be imported.
-        how: Advice for the message of a refused import.
+        how: Advice in the error message of a refused import.
     """
 
     packages: frozenset[str]
@@ -42,13 +42,13 @@ class UntrustedError(ValueError):
 def trust_only(packages: Iterable[str], how: str) -> None:
     """Restricts `find_class` in the whole process to trusted packages, see `check_trusted`.
 
-    Importing a module runs its code. Names that a program reads at its start come from the user, and are trusted. Names
-    that arrive later, in service requests or from a bag, are not trusted. So programs call this function after their
-    start.
+    Importing a module runs the module's code. Names that a program reads at its start come from the user, and are
+    trusted. Names that arrive later, in service requests or from a bag, are not trusted. So programs call this function
+    at the end of their start.
 
     Args:
         packages: The trusted top-level packages.
-        how: Advice for the error message: how to trust another package.
+        how: Advice on how to trust another package, for the error message.
     """
     global _trust
     _trust = _Trust(frozenset(packages), how)
@@ -58,7 +58,7 @@ def trust_only(packages: Iterable[str], how: str) -> None:
 def trusting_only(packages: Iterable[str], how: str) -> Iterator[None]:
     """Restricts `find_class` like `trust_only`, but only within a context, for example while a script reads a bag.
 
-    If `trust_only` was called before, its packages remain trusted as well.
+    If `trust_only` was called before, the packages of that call remain trusted.
     """
     token = _trust_here.set(_Trust(frozenset(packages), how))
     try:
@@ -130,13 +130,13 @@ def find_class(name: str, base: type) -> Any:
 
 
 def full_name(thing: Any) -> str:
-    """Returns the `module:name` of a class or function, which `find` accepts; for other objects, of their class."""
+    """Returns `module:name` of a class or function, as accepted by `find`; for other objects, of the object's class."""
     named = thing if hasattr(thing, "__qualname__") else type(thing)
     return f"{named.__module__}:{named.__qualname__}"
 
 
 def cause_of(error: BaseException) -> str:
-    """Describes an error: its type and message, and the last line of code outside `own_folders` in its traceback."""
+    """Describes an error: type, message, and the last code line in the traceback that is outside `own_folders`."""
     text = f"{type(error).__name__}: {error}"
     places = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_elsewhere(frame.filename)]
     if not places or isinstance(error, SyntaxError):  # a SyntaxError's message has file and line

@@ -13,15 +13,15 @@ from contextlib import contextmanager
 from typing import Any
 
 MIN_MEMORY_BYTES = 500_000_000
-"""Address space that NumPy and PyBullet need [bytes]. With less, they would end the process."""
+"""Address space that NumPy and PyBullet need [bytes]. With less address space, the libraries would end the process."""
 PARENT_PERIOD_S = 0.5
 """Time between two checks of whether the parent process has ended [s]."""
 MAX_END_S = 15.0
-"""Time that a process has to end after SIGINT, before SIGKILL [s]. roslaunch waits as long before it sends SIGTERM."""
+"""Time between SIGINT and SIGKILL to a process [s]. roslaunch waits as long between SIGINT and SIGTERM."""
 
 
 def is_output_closed() -> bool:
-    """Returns whether the standard output is a pipe that the reader has closed."""
+    """Returns whether the standard output is a pipe that has no reader any more."""
     output = select.poll()
     output.register(1, 0)
     return any(event & select.POLLERR for _, event in output.poll(0))
@@ -30,8 +30,8 @@ def is_output_closed() -> bool:
 def run(main: str) -> None:
     """Imports and runs the main function of a node, with SIGINT blocked as `run_node` needs it.
 
-    SIGINT must be blocked before the first thread starts. Libraries start threads on import, so the function is
-    imported here, after SIGINT is blocked. The node ends with the roslaunch that started it.
+    SIGINT must be blocked before the first thread starts. Libraries start threads on import, so the main function is
+    imported after SIGINT is blocked. The node ends when the roslaunch that started the node ends.
 
     Args:
         main: The main function, as `module:function`.
@@ -46,9 +46,9 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
     """Imports and runs the function of a command, and exits with its result.
 
     Ctrl-C ends the command without a traceback, with exit code 130. During imports, Ctrl-C ends the process at once;
-    afterwards it raises a KeyboardInterrupt. A parent may start the process with SIGINT blocked, which delays Ctrl-C
-    until this function runs. If SIGINT is ignored, as for background jobs of a script, it stays ignored. If the reader
-    of the output has ended, as with `| head`, the exit code is 141, as after SIGPIPE.
+    afterwards, Ctrl-C raises a KeyboardInterrupt. A parent may start the process with SIGINT blocked, which delays
+    Ctrl-C until this function runs. If SIGINT is ignored, as for background jobs of a script, it stays ignored. If the
+    reader of the output has ended, as with `| head`, the exit code is 141, as after SIGPIPE.
 
     Args:
         main: The function, as `module:function`.
@@ -82,9 +82,9 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
 
 @contextmanager
 def late_imports() -> Iterator[None]:
-    """Makes Ctrl-C end the process at once within a context in which a command imports libraries.
+    """Makes Ctrl-C end the process at once, within a context in which a command imports libraries.
 
-    Otherwise some libraries catch the KeyboardInterrupt during import, and continue, or fail with a traceback.
+    Without the context, libraries may catch the KeyboardInterrupt during import and continue, or print a traceback.
     """
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
@@ -100,9 +100,9 @@ def late_imports() -> Iterator[None]:
 def _prepare_for_numpy() -> None:
     """Limits NumPy's matrix computations to one thread, and exits with 1 if the memory limit is too low for NumPy.
 
-    Must be called before NumPy is imported. A number of threads that is set in the environment is kept. The matrices of
-    this workspace are small, so that several threads would mostly wait for each other. Under a memory limit, they would
-    wait forever.
+    Must be called before NumPy is imported. If the environment sets a number of threads, this number is kept. The
+    matrices of this workspace are small, so that several threads would mostly wait for each other. Under a memory
+    limit, several threads would wait forever.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < MIN_MEMORY_BYTES:
@@ -113,11 +113,11 @@ def _prepare_for_numpy() -> None:
 
 
 def end_with_roslaunch() -> None:
-    """Starts a thread that ends this process soon after the end of its roslaunch, even if roslaunch was killed.
+    """Starts a thread that ends this process soon after roslaunch has ended, even if roslaunch was killed.
 
-    Only nodes that were started by roslaunch are affected, which have an argument `__log`. Other processes, such as a
-    node in the background of a closed shell, continue after the end of their parent. The thread sends SIGINT, and after
-    15 s SIGKILL. SIGINT must be blocked before this function is called.
+    The thread sends SIGINT, and after 15 s SIGKILL. It is only started in nodes that roslaunch has started, which have
+    an argument `__log`. Other processes, such as a node in the background of a closed shell, continue after the end of
+    their parent. SIGINT must be blocked before this function is called.
     """
     if any(word.startswith("__log:=") for word in sys.argv):
         threading.Thread(target=_wait_and_end, args=(os.getppid(),), name="roslaunch", daemon=True).start()

@@ -1,4 +1,4 @@
-"""Re-exports publishers and subscribers of joint states, for joints in an order that the caller chooses."""
+"""Re-exports publishers and subscribers of joint states that use the caller's order of joints."""
 
 from custom_ros_tools.ros.joint_states import (
     JointStatePublisher,

@@ -1,4 +1,4 @@
-"""Sockets for rospy that a slow client cannot block: connections with buffered sending, and a listening socket."""
+"""Sockets for rospy that a slow client cannot block: a connected socket that buffers, and a listening socket."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from typing import Any, NamedTuple
 MAX_TOGETHER = 32
 """Number of buffered messages at which a socket flushes, and largest number of messages per system call."""
 _at_once = threading.Event()
-"""Set when the loop that flushes has ended. From then on, every message is sent at once."""
+"""Set when the loop that flushes sockets has ended. From then on, every message is sent at once."""
 log = logging.getLogger(__name__)
 HEADER_TIMEOUT_S = 60.0
-"""Time within which a new connection has to send its header [s]; otherwise it is closed."""
+"""Time after which a new connection is closed if its header has not arrived [s]."""
 MAX_HEADER_BYTES = 1 << 20
-"""Largest length of a header [bytes]. Clients with other protocols are recognised because their first four bytes, read
-as a length, are larger."""
+"""Largest length of a header [bytes]. Clients with other protocols are recognised because their first four bytes,
+interpreted as a length, exceed this value."""
 PEEKED = 1 << 15
-"""Number of received bytes from which on a longer header counts as complete [bytes]. The kernel's buffer is limited."""
+"""Number of received bytes after which a longer header counts as complete, since the kernel's buffer is limited."""
 OUT_OF_HANDLES_S = 0.5
 """Time that a node without free file handles waits before it accepts connections again [s]."""
 
 
 class BufferedSocket:
-    """A connected socket whose `sendall` never waits: it buffers messages, and `flush` sends them in order.
+    """A connected socket whose `sendall` never waits: `sendall` buffers messages, and `flush` sends them in order.
 
-    Messages that the receiver does not accept yet stay in the buffer. The class is thread-safe. It always sets
-    TCP_NODELAY, which rospy sets only on request of the subscriber. Otherwise, a message would wait up to 40 ms for the
-    acknowledgement of the previous message.
+    Messages that the receiver does not accept yet stay in the buffer. The class is thread-safe. TCP_NODELAY is always
+    set, not only if the subscriber requests it as with rospy. Without TCP_NODELAY, a message would wait up to 40 ms for
+    the acknowledgement of the previous message.
 
     Args:
         connection: The connected socket.
-        limit: Largest number of buffered messages. If there are more, the oldest messages are dropped.
+        limit: Largest number of buffered messages. If more messages are buffered, the oldest messages are dropped.
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
@@ -51,7 +51,7 @@ class BufferedSocket:
         self._kept: deque[bytes] = deque(maxlen=limit)
         self._most_together = min(limit, MAX_TOGETHER)
         self._error: OSError | None = None
-        """Error that closed the connection; None while it is open."""
+        """Error that closed the connection; None while the connection is open."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._socket, name)
@@ -100,7 +100,7 @@ _unsent: dict[BufferedSocket, None] = {}
 
 
 def send_at_once() -> None:
-    """Flushes all sockets, and makes every later message be sent at once. Call it when the loop that flushes ends."""
+    """Flushes all sockets, and makes them send every later message at once. Call when the loop that flushes ends."""
     _at_once.set()
     flush_buffered_sockets()
 
@@ -128,10 +128,10 @@ class _Pending(NamedTuple):
 class ServerSocket:
     """A listening socket whose `accept` only returns connections whose TCPROS header has arrived.
 
-    rospy reads the headers of all connections in one thread. A client that does not send a header, for example a
-    stopped program, would block all other clients of the node forever. Here, several connections wait for their headers
-    in parallel. If the node has no free file handles, `accept` waits and raises a TimeoutError, after which rospy calls
-    `accept` again. Other errors would end rospy's thread.
+    rospy reads the headers of all connections in one thread. So a client that does not send a header, for example a
+    stopped program, would block all other clients of the node forever. With this class, several connections wait for
+    their headers in parallel. If the node does not have a free file handle, `accept` waits and raises a TimeoutError,
+    after which rospy calls `accept` again. Other errors would end rospy's thread.
 
     Args:
         server: The listening socket.
@@ -175,7 +175,7 @@ class ServerSocket:
         self._poll.register(connection.fileno(), select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET)
 
     def _look_at(self, pending: _Pending) -> None:
-        """Marks a connection as ready if its header has arrived; closes it if no header can arrive."""
+        """Marks a connection as ready if its header has arrived, or closes it if a header cannot arrive any more."""
         try:
             peeked = pending.connection.recv(PEEKED, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:

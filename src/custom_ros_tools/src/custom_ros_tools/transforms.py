@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 MATRIX_TOLERANCE = 1e-3
 """Largest accepted deviation of R R^T from the identity matrix, entry by entry, for a rotation matrix R."""
 MIN_NORM = 1e-6
-"""Least length of a quaternion; shorter quaternions count as zero."""
+"""Smallest length of a quaternion; shorter quaternions count as zero."""
 
 
 def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
@@ -32,7 +32,7 @@ def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
     Args:
         values: The numbers.
         length: Required number of values.
-        name: Name of the values in messages.
+        name: Name of the values in error messages.
 
     Raises:
         ValueError: If the number of values is wrong, or a value is not finite.
@@ -87,7 +87,7 @@ def rpy_of(quat_xyzw: ArrayLike) -> Array:
 
 
 def yaw_of(quat_xyzw: Sequence[float] | Array) -> float:
-    """Returns the yaw of a unit quaternion x, y, z, w: the horizontal direction of the rotated x axis [rad]."""
+    """Returns the yaw of a unit quaternion x, y, z, w [rad]: the angle of the rotated x axis in the x-y plane."""
     x, y, z, w = quat_xyzw
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
@@ -96,7 +96,7 @@ def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
     """Converts a position x, y, z [m] and a quaternion x, y, z, w to a homogeneous matrix, shape (4, 4).
 
     Raises:
-        ValueError: If a length is wrong, a number is not finite, or the quaternion is zero.
+        ValueError: If the count of numbers is wrong, a number is not finite, or the quaternion is zero.
     """
     T = np.eye(4)
     T[:3, :3] = Rotation.from_quat(unit_quat(quat_xyzw)).as_matrix()
@@ -130,7 +130,7 @@ _KEYS = {
 
 
 class StaticTransform(ConfigModel):
-    """A fixed transform between two frames, as arguments of a command give it."""
+    """A fixed transform between two frames, given by the arguments of a command."""
 
     parent: FrameId
     child: FrameId
@@ -151,7 +151,7 @@ class StaticTransform(ConfigModel):
             arguments: `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m and rad].
 
         Raises:
-            ConfigError: If arguments are invalid; the error has a `Problem` for each fault.
+            ConfigError: If arguments are invalid; the error contains a `Problem` for each fault.
         """
         keys = _KEYS.get(len(arguments))
         if keys is None:

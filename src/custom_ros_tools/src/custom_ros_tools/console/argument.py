@@ -1,4 +1,4 @@
-"""Describes the arguments of commands, in annotations of function parameters."""
+"""Annotations of function parameters that describe the arguments of commands."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -13,15 +13,15 @@ class Argument(NamedTuple):
     A keyword-only parameter is an option. All other parameters are positional arguments.
 
     Attributes:
-        shown: Placeholders for the words of the argument in the help, such as `X Y Z`. `NAME ...` means one or more
+        shown: Placeholders for the argument's words in the help text, such as `X Y Z`. `NAME ...` means one or more
             words, `[NAME ...]` means any number of words.
         flag: Name of the option; by default `--` and the name of the parameter.
         parse: Function that converts a word to a value, or raises a ValueError if the word is invalid.
-        choices: Function that returns the valid words; by default, `parse` decides.
+        choices: Function that returns the valid words. None: all words that `parse` accepts are valid.
         is_open: Whether words that are not in `choices` are accepted as well; the command's function checks them.
         offers: Name of a function in `dev/tools/completion.bash` that prints words for completion.
         files: Pattern of the file names that completion offers; empty if completion does not offer files.
-        excludes: Name of a group of options; at most one option of a group may be given.
+        excludes: Name of a group of mutually exclusive options.
         is_raw: Whether the command's function gets all words unparsed, including options.
     """
 
@@ -37,7 +37,7 @@ class Argument(NamedTuple):
 
 
 class UsageError(InterfaceError):
-    """The arguments of a command are invalid. The usage and the message are printed, and the exit code is 2."""
+    """The arguments of a command are invalid. The command prints usage and message, and exits with code 2."""
 
 
 class WrongNumberError(InterfaceError, ValueError):
@@ -45,7 +45,7 @@ class WrongNumberError(InterfaceError, ValueError):
 
 
 def number(text: str) -> float:
-    """Converts a word to a number; a number in degrees, such as `30deg`, is converted to radians.
+    """Converts a word to a number. An angle in degrees, such as `30deg`, is converted to radians.
 
     Raises:
         WrongNumberError: If the word is not a finite number.

@@ -14,13 +14,14 @@ def bench(
     quick: Annotated[bool, Argument("")] = False,
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*")] = None,
 ) -> int:
-    """Runs the benchmarks, each with its lower bound.
+    """Runs benchmarks, and prints each measured figure with its lower bound, if it has one.
 
     Args:
-        NAME: by default all but controls, datasets, dressing, examples, farm, forks, guard_faults, gym, haptics,
-            keyframes, lfd, live_plot, passivity, press, pushing, recording, soak, streams, teleop and verify
-        quick: measures for a shorter time, less exactly
-        json: file for the figures
+        NAME: benchmark to run; by default all but controls, datasets, dressing, examples, farm, forks, guard_faults,
+            gym, haptics, keyframes, lfd, live_plot, passivity, press, pushing, recording, soak, streams, teleop and
+            verify
+        quick: measure for a shorter time, which is less accurate
+        json: file to which the figures are written
     """
     sys.path.insert(0, str(workspace() / "dev/benchmarks"))
     benchmarks = importlib.import_module("run")

@@ -1,4 +1,4 @@
-"""Makes a command of `./rpbi` from a function: argument parser, help text and completion."""
+"""Makes a command of `./rpbi` from a function, with argument parser, help text and completion."""
 
 import argparse
 import inspect
@@ -16,7 +16,7 @@ from .argument import Argument, UsageError
 
 PROGRAM = "./rpbi"
 NAME_WIDTH = 16
-"""Width of the column of argument names in the help text; longer names are followed by three spaces."""
+"""Width of the column with argument names in the help text; longer names are followed by three spaces."""
 _NEGATIVE = re.compile(r"-[\d.]")
 _SECTION = re.compile(r"^(Usage|Args):\n((?:    .*\n|\n)*)", re.MULTILINE)
 
@@ -38,7 +38,7 @@ class Parameter(NamedTuple):
 
     @property
     def is_option(self) -> bool:
-        """Whether the parameter is an option; otherwise it is a positional argument."""
+        """Whether the parameter is an option instead of a positional argument."""
         return self.kind is inspect.Parameter.KEYWORD_ONLY
 
     @property
@@ -53,7 +53,7 @@ class Parameter(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Placeholders of the argument in the help text; for an option, preceded by its name."""
+        """Text for the argument in the help text: placeholders, preceded by the name of an option."""
         return (
             " ".join(filter(None, (self.flag, *self.placeholders))) if self.is_option else " ".join(self.placeholders)
         )
@@ -79,16 +79,16 @@ class Command:
     """A command of `./rpbi`, made from a function.
 
     Each parameter of the function has an `Argument` in its annotation. The function returns the text to print, or the
-    exit code. The first line of its docstring is the summary. Paragraphs and examples may follow in any order. The
-    section `Args:` describes parameters by name, or arguments by their literal text. The section `Usage:` is needed
-    only if the usage cannot be derived from the signature.
+    exit code. The first line of the docstring is the summary. Paragraphs and examples may follow in any order. Entries
+    of the section `Args:` begin with a parameter's name, or with an argument as the user types it. The section `Usage:`
+    is needed only if the usage cannot be derived from the signature.
 
     Args:
         function: The function.
 
     Attributes:
         name: Name of the command, which is the name of the function.
-        summary: First line of the help.
+        summary: First line of the docstring.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -120,10 +120,9 @@ class Command:
         return "\n\n".join(filter(None, blocks)) + "\n"
 
     def completions(self) -> Iterator[str]:
-        """Yields lines for the completion of arguments: command, position, and source of the values.
+        """Yields lines of the completion file, each with the command, an argument, and the source of its values.
 
-        The position is the number of a positional argument, `*` for the last positional argument, or the name of an
-        option.
+        A positional argument is given by its number, the last one by `*`, and an option by its name.
         """
         places = [each for each in self.parameters if not each.is_option]
         for each in self.parameters:
@@ -137,11 +136,12 @@ class Command:
                 yield f"{self.name} {where} files {argument.files}"
 
     def run(self, words: Sequence[str]) -> int:
-        """Runs the command with the words of the command line, and prints its text with unsafe characters escaped.
+        """Runs the command with the words of the command line, and prints the text that the function returns.
+
+        Unsafe characters in the text are escaped. If the function raises an error, the message is printed to stderr.
 
         Returns:
-            The exit code. If the function fails, the message is printed to stderr, and the code is 1. Otherwise the
-            code is the integer that the function returns, or 0.
+            The exit code: 1 after an error, the integer that the function returns, or 0.
 
         Raises:
             BrokenPipeError: If the reader of the standard output has closed the pipe, see `run_command`.
@@ -206,7 +206,7 @@ class Command:
                 yield f"[{shown}]" if each.words == "?" else shown
 
     def _rows(self) -> Iterator[str]:
-        """Yields the formatted text of each entry in the section `Args:`."""
+        """Yields each entry of the section `Args:`, formatted for the help text."""
         by_name = {each.name: each for each in self.parameters}
         for entry in re.split(r"\n(?! )", self._args) if self._args else ():
             name, _, text = entry.partition(": ")
@@ -221,7 +221,7 @@ class Command:
 
 
 def _parse(argument: Argument) -> Callable[[str], Any]:
-    """Returns the function that argparse calls for each word: it parses the word, or checks it against the choices."""
+    """Returns the function that argparse calls for each word, to parse the word or check it against the choices."""
     choices = argument.choices
     if choices is None or argument.is_open:
         return argument.parse

@@ -1,4 +1,4 @@
-"""The command `docs`, and the generators of docs/commands.md and of the completion file for bash."""
+"""The command `docs`, and functions that generate docs/commands.md and the completion file for bash."""
 
 import pkgutil
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ FIRST = (
     *("demo", "launch", "check", "list", "spawn", "remove", "move", "send", "attach", "detach", "gravity"),
     *("save", "restore", "replay", "test", "docs", "bench", "shell", "setup"),
 )
-"""Commands at the beginning of docs/commands.md, in this order; all other commands follow, sorted by name."""
+"""Commands at the beginning of docs/commands.md, in the order of the page; other commands follow, sorted by name."""
 _HEAD = f"""\
 <!-- Written by `{PROGRAM} docs` from the code: change it there, not here. -->
 
@@ -51,7 +51,7 @@ WRITERS = (
     "custom_ros_tools.console.docs:console_files",
     "rpbi_examples.plugins_page:plugin_files",
 )
-"""Functions that take the folder of the workspace, and return the texts of generated files by path."""
+"""Functions that take the folder of the workspace, and return the texts of generated files, indexed by path."""
 
 
 def page(listed: Iterable[Command]) -> str:
@@ -60,7 +60,7 @@ def page(listed: Iterable[Command]) -> str:
 
 
 def console_files(root: Path) -> dict[Path, str]:
-    """Generates docs/commands.md and the completion file for a workspace, and returns their texts by path."""
+    """Returns the texts of docs/commands.md and of the completion file for a workspace, indexed by path."""
     order = {name: place for place, name in enumerate(FIRST)}
     listed = sorted(commands(root), key=lambda each: order.get(each.name, len(order)))
     lines = [line for each in listed for line in each.completions()]
@@ -68,12 +68,12 @@ def console_files(root: Path) -> dict[Path, str]:
 
 
 def files(root: Path) -> dict[Path, str]:
-    """Generates all files of a workspace that are made from code, and returns their texts by path."""
+    """Returns the texts of all files that are generated from a workspace's code, indexed by path."""
     return {path: text for writer in WRITERS for path, text in pkgutil.resolve_name(writer)(root).items()}
 
 
 def docs() -> None:
-    """Generates the schemas for editors and the reference pages from the code."""
+    """Generates the JSON Schemas and the reference pages in docs/ from the code, and writes them to files."""
     root = workspace()
     for path, text in files(root).items():
         path.parent.mkdir(exist_ok=True)

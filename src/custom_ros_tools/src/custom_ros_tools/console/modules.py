@@ -12,7 +12,7 @@ from custom_ros_tools.program import run_command
 from .command import Command
 
 FOLDERS = ("console", "ros/console")
-"""Folders within a Python package whose modules may have commands."""
+"""Folders within a Python package whose modules may contain commands."""
 
 
 def workspace() -> Path:
@@ -21,14 +21,14 @@ def workspace() -> Path:
 
 
 def module_names(root: Path) -> list[str]:
-    """Returns the full names of all modules in a workspace that may have commands, sorted."""
+    """Returns the sorted full names of all modules in a workspace that may contain commands."""
     files = {file for folder in FOLDERS for file in root.glob(f"src/*/src/*/{folder}/*.py")}
     names = (".".join(file.relative_to(root).with_suffix("").parts[3:]) for file in files if file.stem != "__init__")
     return sorted(names)
 
 
 def modules_of(package: str) -> list[str]:
-    """Returns the full names of all modules in a Python package."""
+    """Returns the full names of the modules in a Python package that may contain commands."""
     return [f"{package}.{each.name}" for each in pkgutil.iter_modules(importlib.import_module(package).__path__)]
 
 
@@ -46,7 +46,7 @@ def commands(root: Path) -> list[Command]:
 
 
 def run_console(module: str, words: Sequence[str] | None = None) -> None:
-    """Runs the command of a module, and exits.
+    """Runs the command in a module, and exits.
 
     Args:
         module: Full name of the module, whose last part is the name of the command.
@@ -57,12 +57,12 @@ def run_console(module: str, words: Sequence[str] | None = None) -> None:
 
 
 def run_console_of(*packages: str) -> None:
-    """Runs the command that the first argument of the process names, searched in some Python packages, and exits."""
+    """Finds the command that the process's first argument names, in some Python packages. Runs it, and exits."""
     _run_one_of(module for package in packages for module in modules_of(package))
 
 
 def run_console_of_workspace() -> None:
-    """Runs the command that the first argument of the process names, searched in the workspace, and exits."""
+    """Finds the command that the process's first argument names, in the workspace. Runs it, and exits."""
     _run_one_of(module_names(workspace()))
 
 

@@ -7,9 +7,10 @@ from .argument import Argument
 
 
 def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> None:
-    """Installs and builds missing parts, as every command does first.
+    """Installs and builds missing parts of the workspace, which every other command also does before it starts.
 
     Args:
-        EXTRA: ik, mpc, tags, data, gym, farm, html, assets or notebook, which stays wanted; see docs/installation.md
+        EXTRA: optional part to install and to keep up to date: ik, mpc, tags, data, gym, farm, html, assets or
+            notebook; see docs/installation.md
     """
     print("Ready.", file=sys.stderr)  # the program `rpbi` has already installed and built everything

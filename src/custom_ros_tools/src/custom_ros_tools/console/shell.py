@@ -9,7 +9,7 @@ from .modules import workspace
 
 
 def shell(*words: Annotated[str, Argument("[-c COMMAND]", is_raw=True)]) -> None:
-    """Opens a shell with the workspace sourced, or runs one command in it.
+    """Opens a shell in which the workspace is sourced, or runs one command in such a shell.
 
     Usage:
         ./rpbi shell [-c COMMAND]

@@ -16,26 +16,26 @@ WORDS = Argument("[--quick | --all] [PATH | OPTION OF PYTEST ...]", files="*", i
 
 
 def test(*words: Annotated[str, WORDS]) -> int:
-    """Runs the tests, or those chosen as for pytest, in parallel workers.
+    """Runs tests in parallel workers: all default tests, or the tests that PATH and options of pytest select.
 
-    The default tests are those that a change can break. Tests with the mark `thorough` run only with
-    --all, also when their file or their own name is given as PATH.
+    Default tests are all tests without the mark `thorough`. Tests with this mark only run with --all, even if PATH
+    names the file or the test.
 
-    A run without PATH installs all extras first, 1.8 GB. With PATH, no extra is installed; tests that need a missing
-    extra are skipped, and the reason names it.
+    A run without PATH installs all extras first, 1.8 GB. With PATH, extras are not installed. Tests that need a missing
+    extra are skipped, and the reason names the extra.
 
-    A run ends with the time of each folder, of the slowest files and of the slowest tests.
+    At the end, the run prints the time of each folder, of the slowest files and of the slowest tests.
 
-    Up to three failed tests are run once more, each by itself, after all others. If all of them pass, the run passes,
-    counts them as `flaky` and prints both outputs. A second failure, or more than three failed tests, make the run
-    fail.
+    After all tests, up to three failed tests are repeated, each in a separate run. If all of them pass, the whole run
+    passes, counts these tests as `flaky` and prints both outputs. If one of them fails again, or if more than three
+    tests have failed, the whole run fails.
 
     Args:
-        --quick: most that need no ROS, and one test of each ROS path
-        --all: also examples and scenes to their end, hostile files at scale, tests of benchmarks, and installation
-        --strict: no failed test is run again
-        -n N: N workers; -n 0 is one process
-        PATH: a folder, a file or FILE::TEST
+        --quick: run only one test of each ROS path, and most of the tests that do not need ROS
+        --all: also run complete examples and scenes, large hostile files, tests of benchmarks, and installation
+        --strict: do not repeat failed tests
+        -n N: number of workers; with 0, all tests run in one process
+        PATH: folder, file or FILE::TEST to run
     """
     root = workspace()
     is_chosen = any(Path(word.partition("::")[0]).exists() for word in words)

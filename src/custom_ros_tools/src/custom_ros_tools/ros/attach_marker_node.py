@@ -43,7 +43,7 @@ class AttachMarkerNode:
 
 
 def _marker(config: MarkerConfig) -> Marker:
-    """Makes the marker message, without pose and stamp."""
+    """Makes the marker message, but does not set pose and stamp."""
     marker = Marker(type=getattr(Marker, config.type), action=getattr(Marker, config.action))
     marker.header.frame_id = config.frame_id
     marker.ns = rospy.get_name()  # otherwise markers of several nodes on one topic would replace each other

@@ -17,7 +17,7 @@ def values_in(message: JointState) -> JointValues:
     """Converts a message to checked values.
 
     Raises:
-        ValueError: If lengths differ, a joint name is repeated, or a value is not finite.
+        ValueError: If lists differ in length, a joint name is repeated, or a value is not finite.
     """
     return JointValues.of(message.name, message.position, message.velocity, message.effort)
 
@@ -34,16 +34,16 @@ def joint_state(values: JointValues, header: Header) -> JointState:
 
 
 def resolve_joint_order(msg: JointState, joint_names: Sequence[str], ns: str = "") -> JointState:
-    """Selects joints from a joint state, in a given order; quantities that the message lacks stay empty.
+    """Selects joints from a joint state, in a given order. Quantities that the message lacks stay empty.
 
     Args:
-        msg: The joint state, in any order, possibly with further joints.
+        msg: The joint state, with joints in any order; may contain additional joints.
         joint_names: Names of the joints in the result.
         ns: Prefix of the names in `msg`: joint `a` is called `ns/a`. By default, names have no prefix.
 
     Raises:
-        MissingJointsError: If joints are missing; the error names all of them.
-        ValueError: If lengths in `msg` differ, a joint name is repeated, or a value is not finite.
+        MissingJointsError: If joints are missing; the error names all missing joints.
+        ValueError: If lists in `msg` differ in length, a joint name is repeated, or a value is not finite.
     """
     return joint_state(values_in(msg).in_order(joint_names, ns), msg.header)
 
@@ -90,7 +90,7 @@ class JointStatePublisher(rospy.Publisher):
         qd: Iterable[float] | None = None,
         eff: Iterable[float] | None = None,
     ) -> None:
-        """Publishes a joint state with the present time as stamp. Quantities that are not given stay empty.
+        """Publishes a joint state with the current time as stamp. Quantities that are not given stay empty.
 
         Args:
             q: n positions [rad or m].
@@ -105,19 +105,19 @@ class JointStatePublisher(rospy.Publisher):
 
 
 QUEUE_SIZE = 1000
-"""Queue size for subscribers with a callback, so that the callback misses no message on a busy machine."""
+"""Queue size for subscribers with a callback, so that messages are not lost on a busy machine."""
 
 
 class JointStateSubscriber(rospy.Subscriber):
-    """Stores the newest joint state of a topic, with its joints in a given order.
+    """Stores the newest joint state of a topic, with joints in a given order.
 
-    Messages that are invalid or lack joints are refused with a throttled warning; then the previous message stays.
+    Messages that are invalid or lack joints are ignored, with a throttled warning. The previous message is then kept.
 
     Args:
         topic_name: Name of the topic.
         joint_names: Names of the n joints, in the desired order.
         ns: Prefix of the names in messages: joint `a` is called `ns/a`. By default, names have no prefix.
-        callback: Function that is called with each reordered joint state. Up to 1,000 messages are queued for it.
+        callback: Function that is called with each reordered joint state. Up to 1,000 messages wait in a queue.
     """
 
     def __init__(

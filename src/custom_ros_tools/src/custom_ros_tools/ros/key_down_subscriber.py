@@ -11,7 +11,8 @@ class KeyDownSubscriber(rospy.Subscriber):
     """Calls a function for each pressed key that is published on the topic `keyboard/keydown`.
 
     Args:
-        key_action_map: Functions without arguments, by key code, such as `{Key.KEY_a: start}`. Other keys are ignored.
+        key_action_map: Functions without arguments, indexed by key code, such as `{Key.KEY_a: start}`. Other keys are
+            ignored.
     """
 
     def __init__(self, key_action_map: Mapping[int, Callable[[], Any]]) -> None:

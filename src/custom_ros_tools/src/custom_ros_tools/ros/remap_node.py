@@ -22,9 +22,9 @@ Config = TypeVar("Config", bound=RemapConfig)
 TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
 TO_JOINT_STATE = "remap_joint_state_to_joint_state"
 QUEUE_SIZE = 100
-"""Queue size: on a busy machine, 0.1 s of joint states at 1 kHz can wait."""
+"""Queue size of publisher and subscriber, enough for 0.1 s of joint states at 1 kHz on a busy machine."""
 START_WAIT_S = 2.0
-"""Longest time to wait for a command, and for a state of the robot, when the node is switched on [s]."""
+"""Longest time to wait for a command and for a state of the robot, each, when the node is switched on [s]."""
 
 
 class RemapNode:
@@ -37,8 +37,8 @@ class RemapNode:
         source: Topic of the joint states to convert.
         target: Topic of the converted messages.
         target_type: Type of the converted messages.
-        convert: Function that converts a joint state to a message. It raises an InterfaceError or a ValueError if the
-            joint state is refused.
+        convert: Function that converts a joint state to a message. To refuse the joint state, it raises an
+            InterfaceError or a ValueError.
         config: The configuration, which may have a condition for switching on.
         start_on_init: Whether the node is on initially.
     """
@@ -92,14 +92,15 @@ class RemapNode:
 
 
 def _check_start(config: RemapConfig, source: str) -> None:
-    """Waits for a command and for a measured state of the robot, and checks that they are near each other.
+    """Waits for a command and for a measured state of the robot, and checks that both are near each other.
 
     Args:
         config: The configuration, with `start_within`.
         source: Topic of the commands.
 
     Raises:
-        InterfaceError: If a joint's command and state are too far apart, or a message lacks joints or does not arrive.
+        InterfaceError: If a joint's command and state are too far apart, or if a message lacks joints or does not
+            arrive.
         ValueError: If a message is invalid.
     """
     assert config.start_within is not None
@@ -122,7 +123,7 @@ def _one_state(topic: str) -> JointValues:
 
 
 def _float_array_node() -> RemapNode:
-    """Makes the node that publishes one quantity of the joint states as an array of numbers, as `~config` says.
+    """Makes the node that publishes one quantity of joint states as an array of numbers, with options in `~config`.
 
     Raises:
         ConfigError: If the configuration or a parameter is invalid.
@@ -144,7 +145,7 @@ def _float_array_node() -> RemapNode:
 
 
 def _joint_state_node() -> RemapNode:
-    """Makes the node that publishes joint states on another topic, with names and units as in `~config`.
+    """Makes the node that publishes joint states on another topic, with joint names and units from `~config`.
 
     Raises:
         ConfigError: If the configuration or a parameter is invalid.
@@ -165,7 +166,7 @@ def _joint_state_node() -> RemapNode:
 
 
 def _parameters(model: type[Config]) -> tuple[Config, bool]:
-    """Reads the configuration, and whether the node is on initially."""
+    """Reads `~config`, and the parameter that says whether the node is on initially."""
     with collecting_problems() as part:
         with part():
             config = private_config(model)

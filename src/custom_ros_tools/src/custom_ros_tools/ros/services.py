@@ -15,7 +15,7 @@ Handler = Callable[[], tuple[bool, str]]
 
 
 class Toggle:
-    """Switches a function of a node on and off, and refuses to switch it to its present state. Thread-safe.
+    """Switches a function of a node on and off. Switching it to the state it already has fails. Thread-safe.
 
     Args:
         name: Name of the function in messages.
@@ -54,7 +54,7 @@ def get_srv_handler(
         srv_name: Name of the service.
         srv_type: Type of the service.
         persistent: Whether to keep one connection open. This is faster, but the proxy fails if the server restarts.
-        headers: Further headers of the connection.
+        headers: Additional header fields of the connection.
 
     Raises:
         rospy.ROSInterruptException: If ROS shuts down during the wait.
@@ -73,11 +73,11 @@ def get_srv_handlers(srvs: Mapping[str, type], persistent: bool = False) -> dict
     """Waits for several services, see `get_srv_handler`.
 
     Args:
-        srvs: Types of the services, by service name.
+        srvs: Types of the services, indexed by service name.
         persistent: Whether to keep the connections open.
 
     Returns:
-        The proxies, by service name.
+        The proxies, indexed by service name.
     """
     return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in srvs.items()}
 
@@ -104,8 +104,8 @@ class ToggleService(rospy.Service):
 
     Args:
         name: Name of the service.
-        enable_handler: Function for true; returns the fields of the response, success and message.
-        disable_handler: Function for false; returns the fields of the response, success and message.
+        enable_handler: Function for true; returns the response's fields `success` and `message`.
+        disable_handler: Function for false; returns the response's fields `success` and `message`.
         options: Options of `rospy.Service`, such as `error_handler`.
     """
 
@@ -114,6 +114,6 @@ class ToggleService(rospy.Service):
         super().__init__(name, SetBool, self.toggle, **options)
 
     def toggle(self, req: SetBoolRequest) -> SetBoolResponse:
-        """Handles a request of the service; Python code can call this method directly, too."""
+        """Handles a request to the service. Python code can also call this method directly."""
         success, message = self._enable() if req.data else self._disable()
         return SetBoolResponse(success, message)

@@ -18,18 +18,19 @@ from .transform_messages import position_in, quat_in, transform_message
 
 QUEUE_SIZE = 100
 NORM_TOLERANCE = 0.01
-"""Largest deviation of a quaternion's squared length from 1, as in tf2. Other transforms are rejected."""
+"""Largest accepted deviation of a quaternion's squared length from 1, as in tf2."""
 END_OF_TIME_S = 2**31
-"""Transforms with this stamp or a later one are rejected, since tf2 would read invalid memory and crash [s]."""
+"""Stamp from which on transforms are rejected [s], since tf2 would read invalid memory and crash."""
 NS_PER_S = 1_000_000_000
 NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 POLL_S = 0.01
 
 
 class TfListener:
-    """Stores transforms from /tf and /tf_static in a buffer, like `tf2_ros.TransformListener`, but checks them first.
+    """Checks transforms from /tf and /tf_static, and stores the valid transforms in a buffer.
 
-    Without the check, some invalid transforms crash the process in tf2. For all others, tf2 prints two lines each time.
+    `tf2_ros.TransformListener` does not check transforms. So some invalid transforms crash the process in tf2, and for
+    each of the others, tf2 prints two lines.
 
     Args:
         buffer: The buffer.
@@ -61,7 +62,7 @@ class TfListener:
 
 
 def fault_in(transform: TransformStamped) -> str | None:
-    """Checks a transform; returns a description of its first fault, or None if the transform is valid."""
+    """Returns a description of a transform's first fault, or None if the transform is valid."""
     parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
     position, quat, stamp = transform.transform.translation, transform.transform.rotation, transform.header.stamp
     if not parent or not child or parent == child:
@@ -82,7 +83,7 @@ class TfInterface:
 
     A transform from parent to child is the pose of the child in the parent frame: position [m] and quaternion
     x, y, z, w. Create one object per node, after `rospy.init_node`. The object does not know transforms that were sent
-    on /tf before.
+    on /tf before its creation.
     """
 
     def __init__(self) -> None:
@@ -98,7 +99,7 @@ class TfInterface:
         orientation: ArrayLike = NO_ROTATION,
         eul_deg: bool = False,
     ) -> None:
-        """Broadcasts a transform with the present time as stamp.
+        """Broadcasts a transform with the current time as stamp.
 
         Args:
             parent_frame_id: Name of the parent frame.
@@ -125,13 +126,13 @@ class TfInterface:
             return None
 
     def get_tf(self, parent_frame_id: str, child_frame_id: str) -> tuple[Array, Array] | tuple[None, None]:
-        """Returns position [m] and quaternion x, y, z, w of the newest transform; (None, None) if TF lacks it."""
+        """Returns position [m] and quaternion x, y, z, w of the newest transform; (None, None) without a transform."""
         return _pose(self.get_tf_msg(parent_frame_id, child_frame_id))
 
     def wait_for_tf_msg(
         self, parent_frame_id: str, child_frame_id: str, timeout: float | None = None
     ) -> TransformStamped | None:
-        """Waits until TF has a transform, and returns the newest.
+        """Waits until TF has a transform between two frames, and returns the newest transform.
 
         Args:
             parent_frame_id: Name of the parent frame.
@@ -139,7 +140,7 @@ class TfInterface:
             timeout: Longest time to wait, in wall time [s]; None waits without limit.
 
         Returns:
-            The transform; None if TF does not have it in time.
+            The transform; None if TF does not have a transform in time.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down during the wait.
@@ -168,7 +169,7 @@ class TfInterface:
         rot: ArrayLike = NO_ROTATION,
         eul_deg: bool = False,
     ) -> TransformStamped:
-        """Makes a transform message with the present time as stamp.
+        """Makes a transform message with the current time as stamp.
 
         Args:
             parent_frame_id: Name of the parent frame.
@@ -178,7 +179,7 @@ class TfInterface:
             eul_deg: Whether roll, pitch, yaw are in degrees instead of radians.
 
         Raises:
-            ValueError: If a length is wrong, a number is not finite, or the quaternion is zero.
+            ValueError: If the count of numbers is wrong, a number is not finite, or the quaternion is zero.
         """
         message = TransformStamped(child_frame_id=child_frame_id, transform=transform_message(pos, rot, eul_deg))
         message.header.frame_id = parent_frame_id
@@ -187,7 +188,7 @@ class TfInterface:
 
     @staticmethod
     def pack_tf(pos: ArrayLike, rot: ArrayLike = NO_ROTATION, eul_deg: bool = False) -> Transform:
-        """Makes a Transform message, which has neither frames nor stamp; for the arguments see `pack_tf_msg`."""
+        """Makes a Transform message, which has neither frames nor stamp; for the arguments, see `pack_tf_msg`."""
         return transform_message(pos, rot, eul_deg)
 
     @staticmethod

@@ -17,7 +17,7 @@ def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool 
         in_deg: Whether roll, pitch, yaw are in degrees instead of radians.
 
     Raises:
-        ValueError: If a length is wrong, a number is not finite, or the quaternion is zero.
+        ValueError: If the count of numbers is wrong, a number is not finite, or the quaternion is zero.
     """
     translation = Vector3(*finite_vector(position, 3, "position").tolist())
     return Transform(translation, Quaternion(*quat_of(orientation, in_deg).tolist()))
@@ -46,10 +46,11 @@ def as_pose(transform: Transform) -> Pose:
 
 
 class TransformTopic:
-    """Publishes the transform between two frames on /tf, with the present ROS time as stamp.
+    """Publishes the transform between two frames on /tf, with the current ROS time as stamp.
 
-    A message that equals the last message is not published, since a repeated stamp makes TF listeners log warnings.
-    This happens while simulated time is stopped. The topic is latched, so that new subscribers get the last message.
+    A message that equals the last message, also in its stamp, is not published, since a repeated stamp makes TF
+    listeners log warnings. Stamps are repeated while simulated time is stopped. The topic is latched, so that new
+    subscribers get the last message.
 
     Args:
         parent: Name of the parent frame.
@@ -62,7 +63,7 @@ class TransformTopic:
         self._publisher = rospy.Publisher("/tf", TFMessage, latch=True, queue_size=10)
 
     def send(self, transform: Transform) -> rospy.Time:
-        """Publishes the pose of the child in the parent, see above, and returns the stamp of the message."""
+        """Publishes the child's pose in the parent frame, unless the message is a repetition, and returns the stamp."""
         message = TransformStamped(child_frame_id=self._child, transform=transform)
         message.header.frame_id = self._parent
         message.header.stamp = rospy.Time.now()

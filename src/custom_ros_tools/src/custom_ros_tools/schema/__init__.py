@@ -31,7 +31,8 @@ _FRAME_ID = r"[^\s/](\S*[^\s/])?"
 class ConfigModel(BaseModel):
     """Base class of all configuration models, which are immutable and picklable, and reject unknown keys.
 
-    A whole number is accepted for a number, and a list for a tuple. All other values of wrong types are rejected.
+    An integer is accepted where a float is expected, and a list where a tuple is expected. All other values of wrong
+    types are rejected.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
@@ -42,11 +43,11 @@ class ConfigModel(BaseModel):
 
         Args:
             data: Content of the file, which is copied.
-            file: Name of the file, for messages; `"~config"` for a configuration from the parameter server.
-            context: Further entries of `info.context` for validators, such as the folders to search.
+            file: Name of the file, for error messages; `"~config"` for a configuration from the parameter server.
+            context: Additional entries of `info.context` for validators, such as the folders to search.
 
         Raises:
-            ConfigError: If the content is invalid; the error has a `Problem` for each fault.
+            ConfigError: If the content is invalid; the error contains a `Problem` for each fault.
         """
         if not isinstance(data, Mapping):
             got = "nothing" if data is None else type(data).__name__
@@ -94,7 +95,7 @@ def _one_as_list(given: Any) -> Any:
 
 
 def _within(largest: float, unit: str = "") -> AfterValidator:
-    """Makes a validator that rejects numbers whose magnitude exceeds `largest`; `unit` is for the message."""
+    """Makes a validator that rejects numbers whose magnitude exceeds `largest`; `unit` appears in the error message."""
 
     def check(value: Any) -> Any:
         for number in value if isinstance(value, tuple) else (value,):
@@ -107,7 +108,7 @@ def _within(largest: float, unit: str = "") -> AfterValidator:
 
 
 MAX_COORDINATE_M = 1e6
-"""Largest magnitude of a coordinate [m]. With larger coordinates, a body's state may become infinite."""
+"""Largest accepted magnitude of a coordinate [m]. With larger coordinates, a body's state may become infinite."""
 HEAVIEST_KG = 1e9
 _MAX_NUMBER, _MAX_COUNT = 1e12, 2**31 - 1
 
@@ -117,7 +118,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0), _within(_MAX_COUNT)]
 Hz = Annotated[float, Field(gt=0), Unit("Hz")]
 HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
-"""A rate; 0 disables it."""
+"""A rate [Hz]; 0 means that the action with this rate is disabled."""
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
 Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
 Metres = Annotated[float, _within(MAX_COORDINATE_M, "m"), Unit("m")]
@@ -132,7 +133,7 @@ Position = Annotated[Vec3, Unit("m")]
 Direction = Annotated[Vec3, AfterValidator(_direction)]
 """A direction vector x, y, z of any length but zero."""
 Quat = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit_quaternion)]
-"""A quaternion x, y, z, w, which is normalised; its length must not be zero."""
+"""A quaternion x, y, z, w of any length but zero, which is normalised."""
 Rgba = Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)]
 Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
@@ -145,14 +146,14 @@ Switch = Annotated[
     BeforeValidator(_switch),
     WithJsonSchema({"type": ["boolean", "integer"], "minimum": 0, "maximum": 1}),
 ]
-"""True or false, also written as 1 or 0, as is usual with PyBullet."""
+"""True or false; 1 and 0, which are usual with PyBullet, are accepted as well."""
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[
     str, AfterValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{_NAME}$"}), Expects("a name")
 ]
 """Name of an object: letters, digits and '_'."""
 TopicName = Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")]
-"""Name of a topic, relative, private or absolute."""
+"""Relative, private or absolute name of a topic."""
 FrameId = Annotated[
     str,
     AfterValidator(_frame_id),

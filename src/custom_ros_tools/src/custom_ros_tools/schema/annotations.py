@@ -11,13 +11,13 @@ from custom_ros_tools.errors import Problem
 
 
 def optional(description: str) -> Any:
-    """Makes the field of an optional key, with the default None."""
+    """Makes the model field of an optional key, with the default None."""
     return Field(None, description=description)
 
 
 @dataclass(frozen=True)
 class _Keyword:
-    """Base class of annotations that add a text to the JSON Schema, under a keyword of this workspace."""
+    """Base class of annotations that add a text to the JSON Schema, under a keyword that this workspace defines."""
 
     text: str
     keyword: ClassVar[str]
@@ -33,7 +33,7 @@ class Unit(_Keyword):
 
 
 class Expects(_Keyword):
-    """Describes the expected value in words, if its type does not. For items of a list, describes the whole list."""
+    """Description of the expected value, if the type says too little. For list items, describes the whole list."""
 
     keyword = "expects"
 
@@ -50,7 +50,7 @@ class AlsoTakes:
 
 @dataclass(eq=False)
 class InnerProblemsError(ValueError):
-    """A validator has validated a value with another model, and found faults. The keys of `problems` are relative to
+    """Faults that a validator found by validating a value with another model. The keys of `problems` are relative to
     the value.
     """
 

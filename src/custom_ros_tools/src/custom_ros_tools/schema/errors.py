@@ -1,4 +1,4 @@
-"""Translates pydantic's errors to `Problem`s, which name the key, the unit and the expected value."""
+"""Translates pydantic's errors to `Problem`s that name the key, the unit and the expected value."""
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -31,7 +31,7 @@ _RULES = {
         ("dict_type", "model_type", "model_attributes_type", "mapping_type"), f"expected {TYPE_NAMES['object']}"
     ),
 }
-"""Description of the expected value, by the type of pydantic's error. Names in braces are keys of the error's context.
+"""Description of the expected value for each type of pydantic error. Names in braces are keys of the error's context.
 """
 
 
@@ -42,7 +42,7 @@ def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[st
         error: pydantic's error.
         model: The model.
         data: The validated data.
-        file: Name of the file, for messages.
+        file: Name of the file, for error messages.
     """
     problems = []
     all_details = error.errors(include_url=False)
@@ -59,7 +59,7 @@ def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[st
 
 
 def key_path(loc: Sequence[str | int]) -> str:
-    """Converts a location to a key path such as `intrinsics.range[1]`."""
+    """Converts a pydantic error location to a key path such as `intrinsics.range[1]`."""
     text = ""
     for part in loc:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -104,7 +104,7 @@ def _property_at(root: Schema, loc: Sequence[str | int]) -> Schema | None:
 
 
 def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) -> tuple[str, str]:
-    """Returns key path and message for one of pydantic's errors.
+    """Returns the key path and the message for a pydantic error.
 
     Args:
         details: The error.
@@ -132,7 +132,7 @@ def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) ->
 
 
 def _expected(wanted: Schema | None, depth: int = 0) -> str:
-    """Describes the expected value of a key; with depth 1, the expected items of its list, and so on."""
+    """Describes the expected value of a key, or the expected items of `depth` nested lists."""
     if wanted is None:
         return "another value"
     for _ in range(depth):

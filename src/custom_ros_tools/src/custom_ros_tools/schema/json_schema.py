@@ -2,7 +2,7 @@
 
 The dialect is draft-07, the newest dialect that yaml-language-server supports. Three keywords are added. `unit` is the
 unit of a number, `kind` is the name of a family of constants, and `expects` describes the expected value in words. A
-model inside another model is a reference to `$defs`; a description next to the reference describes the key. In an
+model inside another model is a reference to `$defs`. A description that follows the reference describes the key. In an
 `anyOf`, the first alternative is the usual form, and the other alternatives are accepted as well.
 """
 
@@ -25,7 +25,7 @@ _FOR_ALL_TYPES = {"anyOf", "enum", "const", "$ref"}
 
 
 class EditorSchema(GenerateJsonSchema):
-    """pydantic's schema generator, adapted to draft-07, without entries that are useless in editors."""
+    """pydantic's schema generator, adapted to draft-07; leaves out entries that are useless in editors."""
 
     # the model itself checks constraints that a schema cannot express
     ignored_warning_kinds = {"skipped-choice", "non-serializable-default"}
@@ -39,7 +39,7 @@ class EditorSchema(GenerateJsonSchema):
         return result
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
-        """Leaves out the default None, and defaults that are mappings, since editors would insert them."""
+        """Leaves out the default None and defaults that are mappings, since editors would insert these defaults."""
         result = super().default_schema(schema)
         if result.get("default") is None or isinstance(result["default"], dict):
             result.pop("default", None)
@@ -56,9 +56,9 @@ class EditorSchema(GenerateJsonSchema):
         return self.get_union_of_schemas([self.generate_inner(choice) for choice in schema["choices"].values()])
 
     def get_union_of_schemas(self, schemas: list[Schema]) -> Schema:
-        """Merges alternatives into one schema if their types and keywords differ; otherwise makes an `anyOf`.
+        """Merges alternatives into one schema if all types and keywords differ, or makes an `anyOf`.
 
-        Merging is possible because each keyword of draft-07 restricts values of one type only.
+        Merging is possible because most keywords of draft-07 only restrict values of one type.
         """
         types = [kind for each in schemas for kind in types_in(each)]
         keywords = [key for each in schemas for key in each if key != "type"]
@@ -77,19 +77,19 @@ def json_schema(model: type[BaseModel], title: str) -> Schema:
 
     Args:
         model: Model with which the file is validated.
-        title: Name for the kind of file, such as `"robot"`.
+        title: Title of the schema: the kind of file, such as `"robot"`.
     """
     return json_schemas({title: model})[title]
 
 
 def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
-    """Generates the JSON Schemas of several kinds of YAML files; a model has the same name in all schemas.
+    """Generates the JSON Schemas of several kinds of YAML files. A nested model has the same name in all schemas.
 
     Args:
-        models: Model of each kind of file, by title.
+        models: Model of each kind of file, indexed by title.
 
     Returns:
-        The schemas, by title.
+        The schemas, indexed by title.
     """
     mode: JsonSchemaMode = "validation"
     inputs = [(model, mode) for model in dict.fromkeys(models.values())]
@@ -102,7 +102,7 @@ def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
 
 
 def with_definitions(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
-    """Adds to a schema all definitions that it refers to, directly or indirectly, and returns the new schema."""
+    """Returns a schema with the definitions added that the schema refers to, directly or indirectly."""
     content = {key: value for key, value in schema.items() if key != DEFINITIONS}
     found: dict[str, Schema] = {}
     waiting = [*references_in(content)]
@@ -130,21 +130,21 @@ def name_of(reference: Schema) -> str:
 
 
 def resolved(schema: Schema, root: Schema) -> Schema:
-    """Follows a reference: returns the definition that `schema` refers to; other schemas are returned unchanged.
+    """Returns the definition that a reference refers to; returns schemas that are not references unchanged.
 
     Args:
         schema: The schema or reference.
-        root: Schema of the file, which has the definitions.
+        root: Schema of the file, which contains the definitions.
     """
     return dict(root[DEFINITIONS][name_of(schema)]) if "$ref" in schema else schema
 
 
 def mapping_in(schema: Schema, root: Schema) -> Schema | None:
-    """Returns the schema of a mapping that a key's value may be, or that the items of its list may be.
+    """Returns the schema of the mapping if a value may be a mapping or a list of mappings.
 
     Args:
         schema: Schema of the value.
-        root: Schema of the file, which has the definitions.
+        root: Schema of the file, which contains the definitions.
 
     Returns:
         The schema, which may be a reference; None if the value cannot be a mapping or a list of mappings.
@@ -157,7 +157,7 @@ def mapping_in(schema: Schema, root: Schema) -> Schema | None:
 
 
 def types_in(schema: Schema) -> list[str]:
-    """Returns the JSON types in the keyword `type` of a schema; empty without this keyword."""
+    """Returns the JSON types in the keyword `type` of a schema; an empty list if the schema lacks this keyword."""
     kinds = schema.get("type", [])
     return [kinds] if isinstance(kinds, str) else list(kinds)
 
@@ -171,10 +171,13 @@ def unit_in(schema: Schema) -> str | None:
 
 
 def explained(value: Any) -> Any:
-    """Returns a schema in which units and defaults are appended to the descriptions, since editors only show these.
+    """Appends units and defaults to the descriptions in a schema, since editors only show descriptions.
 
-    The description of a key is also added to alternatives that are references. Otherwise editors would show the
-    description of the referenced mapping instead.
+    The description of a key is also added to alternatives that are references. Without it, editors would show the
+    description of the referenced mapping.
+
+    Returns:
+        The new schema.
     """
     if isinstance(value, list):
         return [explained(each) for each in value]
@@ -192,7 +195,7 @@ def explained(value: Any) -> Any:
 
 
 def yaml_text(value: Any) -> str:
-    """Formats plain data in one line, as in YAML."""
+    """Formats plain data as YAML in one line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e6:
@@ -205,11 +208,11 @@ def yaml_text(value: Any) -> str:
 
 
 def schema_texts(folder: Path, by_name: Mapping[str, Schema]) -> dict[Path, str]:
-    """Returns the texts of schema files by path.
+    """Returns the texts of schema files, indexed by path.
 
     Args:
         folder: Folder of the files.
-        by_name: The schemas, by name of the file without extension.
+        by_name: The schemas, indexed by file name without extension.
     """
     return {folder / f"{name}.schema.json": schema_text(explained(schema)) for name, schema in by_name.items()}
 

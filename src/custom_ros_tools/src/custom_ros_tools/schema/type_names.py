@@ -16,13 +16,13 @@ TYPE_NAMES = {
     "array": "a list",
     "object": "a mapping",
 }
-"""Words for JSON types."""
+"""Words for values of the JSON types."""
 _REPR = reprlib.Repr()
 _REPR.maxlevel = 2  # with aliases, a short YAML text can expand to a huge value
 
 
 def shown(value: Any) -> str:
-    """Formats a value about as in YAML, cut to at most 80 characters."""
+    """Formats a value similar to YAML, cut to at most 80 characters."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -43,7 +43,7 @@ def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> s
 
     Args:
         schema: The schema.
-        detailed: Whether the description includes bounds, and all accepted forms instead of the usual form only.
+        detailed: Whether the description includes bounds and all accepted forms, instead of only the usual form.
         plural: Whether the description is in the plural, as in `lists of 3 numbers`.
     """
     if "expects" in schema:
@@ -100,7 +100,7 @@ def _bounds(schema: Schema) -> str:
 
 
 def number_advice(kind: str, value: Any) -> str:
-    """Returns advice for a number that YAML has read as text, such as `1e-3`; otherwise an empty text.
+    """Returns advice for a number that YAML has read as text, such as `1e-3`, or an empty text for other values.
 
     Args:
         kind: Type of pydantic's error.

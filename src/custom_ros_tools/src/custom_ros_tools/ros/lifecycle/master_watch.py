@@ -1,4 +1,4 @@
-"""Registers a node again when the ROS master has restarted and lost its registrations."""
+"""Registers a node again when the ROS master has restarted and lost the node's registrations."""
 
 import contextlib
 import threading
@@ -22,15 +22,16 @@ _METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
 class Registrations:
     """Registers the topics and services of this node with the ROS master, in place of rospy's own code.
 
-    rospy's own code blocks all topics while the master is unreachable, and does not register them again with a
-    restarted master. This class registers changes that were made without a master as soon as a master is reachable.
+    rospy's own code blocks all topics while the master is unreachable, and does not register topics again with a
+    restarted master. This class also registers changes that were made while the master was unreachable, as soon as the
+    master is reachable.
 
     Args:
         registry: The node's topics and services.
         uri: Address of the master.
 
     Attributes:
-        are_complete: False after a failed call of the master, until all registrations have been repeated.
+        are_complete: Whether the master has all registrations. False from a failed call until `repeat` succeeds.
     """
 
     def __init__(self, registry: Registry, uri: str) -> None:
@@ -38,7 +39,7 @@ class Registrations:
         self._registry, self._uri = registry, uri
         self._name, self._node_uri = rospy.get_name(), rospy.get_node_uri()
         self._withdrawn: list[tuple[str, tuple[str, str, str]]] = []
-        """Pending calls, for a master that was unreachable but has kept its registry."""
+        """Method names and arguments of the calls that unregister, to be made when the master is reachable."""
         registry.hand_over(self)
 
     def reg_added(self, name: str, type_or_uri: str, kind: str) -> None:
@@ -115,7 +116,7 @@ class MasterWatch:
     If the master cannot be reached, a warning is logged; existing connections continue. When a restarted master is
     reachable, all topics, services and parameters of the node are registered again, which rospy itself does not do. If
     another node has registered the same name in the meantime, this node ends, as ROS requires for duplicate names. If
-    rospy has unexpected internals, nothing can be registered again, which is reported at the start.
+    rospy has unexpected internals, a warning at the start says that the node cannot register again.
     """
 
     def __init__(self) -> None:
@@ -153,7 +154,7 @@ class MasterWatch:
                 self._registrations.are_complete = False
 
     def _compare(self, master: Any) -> None:
-        """Compares the master's data about this node with the actual state, and registers again or ends the node."""
+        """Compares the master's data about this node with the node's state, and registers again or ends the node."""
         calls: Any = MultiCall(master)
         calls.getPid(self._name)
         calls.lookupNode(self._name, self._name)

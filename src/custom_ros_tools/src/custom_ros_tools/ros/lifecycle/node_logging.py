@@ -17,7 +17,7 @@ ROSPY_LOGGER = "rosout"
 MAX_WAIT_S = 10.0
 """Longest time to wait until the subscribers of /rosout have connected to a node that has just started [s]."""
 MAX_LOOK_S = 1.0
-"""Timeout of the test connection that shows whether a subscriber is alive [s]."""
+"""Timeout of the connection that tests whether a subscriber is alive [s]."""
 SENDING_S = 0.2
 """Time that rospy gets to send the last lines before the process ends [s]."""
 LOG_PARAMETER = "/rosout_disable_topics_generation"
@@ -39,9 +39,9 @@ class _RosHandler(logging.Handler):
 
 
 def attach_logging(modules: Iterable[str]) -> None:
-    """Sends the log records of top-level Python modules to /rosout. Call it once, after `rospy.init_node`.
+    """Sends the log records of top-level Python modules to /rosout. Call once, after `rospy.init_node`.
 
-    Afterwards, errors on writing to the console are ignored.
+    From then on, errors that occur while writing log lines to the console are ignored.
     """
     handler = _RosHandler(level=logging.DEBUG)
     for module in modules:
@@ -56,7 +56,8 @@ def attach_logging(modules: Iterable[str]) -> None:
 def _keep_console_from_raising() -> None:
     """Makes rospy drop log lines that cannot be written to the console, for example on a full disk.
 
-    Otherwise rospy would raise an error in the thread that logs, and could end a timer. /rosout gets the lines anyway.
+    rospy itself would raise an error in the thread that logs, which could end a timer. Dropped lines are still sent to
+    /rosout.
     """
     for handler in logging.getLogger(ROSPY_LOGGER).handlers:
         if isinstance(handler, RosStreamHandler):
@@ -72,15 +73,15 @@ def _dropping_what_cannot_be_written(emit: Callable[[logging.LogRecord], None]) 
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Returns whether a log record should be logged: false for errors of callbacks while ROS shuts down.
+    """Returns False for errors of callbacks while ROS shuts down, and True for all other log records.
 
-    During the shutdown, rospy closes topics, so that callbacks that publish raise errors.
+    During the shutdown, rospy closes topics. So callbacks that publish raise errors, which are not worth logging.
     """
     return not (rospy.core.is_shutdown_requested() and record.getMessage().startswith("bad callback"))
 
 
 def log_fatal_lines(lines: Iterable[str]) -> None:
-    """Logs lines with level fatal, on the console and on /rosout, and gives rospy time to send them."""
+    """Logs lines with level fatal on the console and /rosout, and waits until rospy has had time to send them."""
     publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # shares the connections of rospy's publisher
     end_s = time.monotonic() + MAX_WAIT_S
     expected = _count_subscribers()
@@ -94,7 +95,7 @@ def log_fatal_lines(lines: Iterable[str]) -> None:
 
 
 def _count_subscribers() -> int:
-    """Returns how many nodes subscribe to /rosout and accept connections; 0 if the master cannot be reached."""
+    """Returns the number of nodes that subscribe to /rosout and accept connections; 0 if the master is unreachable."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         master = rosgraph.Master(rospy.get_name())
         nodes = dict(master.getSystemState()[1]).get(ROSOUT, ())

@@ -1,4 +1,4 @@
-"""Reads and validates the private parameters of a node, and restores parameters at a restarted ROS master."""
+"""Reads and validates the private parameters of a node, and sets parameters again at a restarted ROS master."""
 
 import contextlib
 from typing import Any, TypeVar
@@ -16,16 +16,16 @@ def private_config(model: type[Model]) -> Model:
     """Reads the parameter `~config`, and validates it with a model.
 
     Raises:
-        ConfigError: If the parameter is invalid; the error lists all faults.
+        ConfigError: If the parameter is invalid; the message lists all faults.
     """
     return model.parse(rospy.get_param("~config", {}), "~config")
 
 
 def private_parameters(model: type[Model]) -> Model:
-    """Reads the private parameters that are fields of a model, and validates them; ignores all other parameters.
+    """Reads and validates the private parameters that are fields of a model. Ignores all other parameters.
 
     Raises:
-        ConfigError: If a parameter is invalid; the error names the node.
+        ConfigError: If a parameter is invalid; the message names the node.
     """
     keys = [key for key in model.model_fields if rospy.has_param(f"~{key}")]
     return model.parse({key: rospy.get_param(f"~{key}") for key in keys}, rospy.get_name())
@@ -38,7 +38,7 @@ class KeptParameters:
         self._values: dict[str, Any] = {}
 
     def keep(self, name: str) -> None:
-        """Stores the present value of a parameter, or of all parameters in a namespace; ignores missing parameters."""
+        """Stores the current value of a parameter, or all values in a namespace; ignores missing parameters."""
         name = rospy.resolve_name(name)
         if rospy.has_param(name):
             self._values[name] = rospy.get_param(name)
@@ -51,7 +51,7 @@ class KeptParameters:
             master.setParam(rospy.get_name(), name, value)
 
     def delete(self, name: str) -> None:
-        """Deletes a parameter here and at the master. A missing parameter or unreachable master is ignored."""
+        """Deletes a parameter in this object and at the master; ignores a missing parameter or unreachable master."""
         name = rospy.resolve_name(name)
         self._values.pop(name, None)
         with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
@@ -70,4 +70,4 @@ class KeptParameters:
 
 
 kept_parameters = KeptParameters()
-"""Kept parameters of this process, which is one node."""
+"""The kept parameters of this process's node."""

@@ -1,9 +1,9 @@
-"""Starts and runs a node such that Ctrl-C ends it at any time, without a hang or traceback.
+"""Starts and runs a node that Ctrl-C can end at any time, without a hang or traceback.
 
 rospy itself shuts down inside the signal handler, at any point of the program. The process may hang forever if the
 interrupted code holds a lock that the shutdown needs, or if a thread opens or closes a topic at the same time.
-Therefore SIGINT stays blocked (see `custom_ros_tools.program`), and a thread waits for the signal. Child processes
-inherit the blocked signal, so this process has to end them.
+Therefore, SIGINT stays blocked (see `custom_ros_tools.program`), and a thread waits for the signal. In child processes,
+SIGINT is blocked as well, so this process has to end its children.
 """
 
 import atexit
@@ -30,15 +30,15 @@ from .timed_master import address_fault, allow_large_integers
 T = TypeVar("T")
 
 MAX_FAREWELL_S = 10.0
-"""Longest time for unregistering from the ROS master, which may hang or have ended [s]."""
+"""Longest time to wait for unregistering from the ROS master, which may hang or have ended [s]."""
 MASTER_PERIOD_S = 0.2
 INTERRUPTED_TOO_S = 1.0
-"""Time to wait for an interrupt after a failed service call [s]: Ctrl-C may have ended the other node first."""
+"""Time to wait for an interrupt after a failed service call [s], since Ctrl-C may end the server before this node."""
 MAX_FILES = 8192
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
-    """Initialises a node, and makes it register again at a restarted ROS master; for the arguments see `run_node`."""
+    """Initialises a node that registers again at a restarted ROS master; for the arguments, see `run_node`."""
     keep_accepting()
     keep_new_connections()
     allow_large_integers()
@@ -60,7 +60,7 @@ def run_node(
     ros_time: bool = True,
     loggers: Iterable[str] = (),
 ) -> None:
-    """Runs a node until it is interrupted; after an error, such as an invalid configuration, exits with 1.
+    """Runs a node until an interrupt. After an error, such as an invalid configuration, exits with code 1.
 
     The program must have been started with `custom_ros_tools.program.run`, which blocks SIGINT.
 
@@ -70,8 +70,8 @@ def run_node(
             raise `rospy.ROSInterruptException`. The returned object is kept until the node ends.
         run: Function that does the node's work until ROS shuts down, with the object that `start` returned. If `run` is
             given, an interrupt takes effect only after `start` has returned.
-        anonymous: Whether the name is made unique.
-        ros_time: Whether the node uses ROS time; otherwise it never waits for /clock.
+        anonymous: Whether ROS makes the name unique by a suffix.
+        ros_time: Whether the node uses ROS time. If False, the node never waits for /clock.
         loggers: Top-level Python modules whose log records go to /rosout, in addition to the module of `start`.
     """
     if not _wait_for_master():
@@ -107,7 +107,7 @@ def run_node(
 
 
 def _wait_for_master() -> bool:
-    """Waits for a ROS master, and returns whether it is reachable; False after an interrupt.
+    """Waits for a ROS master. Returns True when a master is reachable, or False after an interrupt.
 
     Also makes SIGTERM act like SIGINT.
     """
@@ -124,7 +124,7 @@ def _wait_for_master() -> bool:
 
 @contextmanager
 def _leaving_ros_on_interrupt() -> Iterator[None]:
-    """Shuts ROS down, in a separate thread, on SIGINT or when the context ends."""
+    """Shuts ROS down in a separate thread, either on SIGINT or when the context ends."""
     thread = threading.Thread(target=_wait_and_leave, name="interrupts", daemon=True)
     thread.start()
     try:
@@ -135,9 +135,9 @@ def _leaving_ros_on_interrupt() -> Iterator[None]:
 
 
 def leave_ros_on_signals() -> None:
-    """Makes SIGINT and SIGTERM shut ROS down, in a separate thread, for scripts that do not use `run_node`.
+    """Makes SIGINT and SIGTERM shut ROS down in a separate thread, for scripts that do not use `run_node`.
 
-    Call it in the main thread, after `rospy.init_node(..., disable_signals=True)`.
+    Call this function in the main thread, after `rospy.init_node(..., disable_signals=True)`.
     """
     rospy.on_shutdown(_leave_parameters)
     reading, writing = os.pipe()
@@ -160,8 +160,8 @@ def leave_ros_on_signals() -> None:
 def _leave_parameters() -> None:
     """Unsubscribes from the parameter `LOG_PARAMETER`, which rospy itself does not do.
 
-    Otherwise the master keeps the subscription. When another node uses the same name later, the master would shut down
-    the node that has this node's address then.
+    If the subscription were kept, and another node used the same name later, the master would try to shut down this
+    node, and would shut down a node that has got this node's address in the meantime.
     """
     with contextlib.suppress(OSError, rosgraph.MasterException):
         rosgraph.Master(rospy.get_name()).unsubscribeParam(rospy.get_node_uri(), LOG_PARAMETER)
@@ -177,7 +177,7 @@ def _wait_and_leave() -> None:
 
 
 def _allow_many_files() -> None:
-    """Raises the process's limit of open files up to `MAX_FILES`, since every connection of a topic needs a file."""
+    """Raises the process's limit of open files to `MAX_FILES`, if allowed, since each topic connection needs a file."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = MAX_FILES if hard == resource.RLIM_INFINITY else min(hard, MAX_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:

@@ -1,4 +1,4 @@
-"""Calls the ROS master with a time limit, and checks the addresses and ports that nodes and masters use."""
+"""Calls the ROS master with a time limit, checks this node's address, and finds ports for private masters."""
 
 import http.client
 import os
@@ -14,28 +14,28 @@ import rosgraph
 TIMEOUT_S = 2.0
 """Longest time to wait for an answer of the master [s]; usually, an answer takes milliseconds."""
 MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
-"""Exceptions of calls to the master if it has ended or hangs, or if another program uses its port."""
+"""Exceptions of calls to the master if the master has ended or hangs, or if another program uses the master's port."""
 
 PORTS = range(22000, 32000)
 """Ports for private masters, outside the range that the kernel assigns automatically."""
 
 
 class TimedTransport(Transport):
-    """XML-RPC transport with a timeout [s], since a stopped process accepts connections but never answers."""
+    """XML-RPC transport with the timeout `TIMEOUT_S`, since a stopped process accepts connections but never answers."""
 
     def __init__(self, timeout_s: float) -> None:
         super().__init__()
         self._timeout_s = timeout_s
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Makes a connection with the timeout; called by the base class."""
+        """Makes a connection that has the timeout; called by the base class."""
         connection = super().make_connection(host)
         connection.timeout = self._timeout_s
         return connection
 
 
 def timed_master(uri: str | None = None) -> Any:
-    """Returns the XML-RPC interface of a ROS master, as a context that closes the connection at its end.
+    """Returns the XML-RPC interface of a ROS master, as a context manager that closes the connection.
 
     Calls return (code, message, value). They raise one of `MASTER_FAILURES` if the master does not answer in time.
 
@@ -46,7 +46,7 @@ def timed_master(uri: str | None = None) -> Any:
 
 
 def allow_large_integers() -> None:
-    """Makes Python's XML-RPC send integers with more than 32 bits, as type `i8`, instead of raising an error.
+    """Makes Python's XML-RPC send integers with more than 32 bits as type `i8`, instead of raising an error.
 
     rospy counts sent bytes. Without this change, a node that has sent more than 2 GB could not answer `getBusStats`,
     from which recorders read the number of sent messages.
@@ -61,11 +61,11 @@ def allow_large_integers() -> None:
 
 
 def address_fault() -> str | None:
-    """Checks the address under which other nodes reach this node; returns a warning in one line, or None.
+    """Checks the address under which other nodes reach this node. Returns a warning in one line, or None.
 
     The address comes from ROS_HOSTNAME, ROS_IP or this computer's name. Three conditions are checked. The address must
-    belong to this computer. It must not be a loopback address if the master is reached through a network. If the master
-    is on another computer, it should be the address from which this computer reaches the master.
+    belong to this computer. If the master is reached through a network, the address must not be a loopback address. If
+    the master is on another computer, the address should be that from which this computer reaches the master.
     """
     variable = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if os.environ.get(name)), None)
     given = rosgraph.network.get_host_name()
@@ -106,7 +106,7 @@ def _is_of_this_computer(address: str) -> bool:
 def unused_port() -> int:
     """Returns a free port for a private master, chosen at random from `PORTS`.
 
-    The kernel does not assign these ports automatically, so that a node cannot get the port before the master uses it.
+    The kernel does not assign `PORTS` automatically, so that a node cannot get the port before the master uses it.
 
     Raises:
         OSError: If all ports are in use.

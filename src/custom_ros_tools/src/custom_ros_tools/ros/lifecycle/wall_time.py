@@ -9,7 +9,7 @@ from collections.abc import Callable
 import rospy
 
 MAX_KINDS = 20
-"""Default of the largest number of different warnings per subject that are logged at once."""
+"""Default of `max_kinds` in `ThrottledWarning`."""
 _NUMBER = re.compile(r"-?\d[\d.]*(e[-+]?\d+)?")
 
 
@@ -31,7 +31,7 @@ class WallRate:
         return self._due_s - time.monotonic()
 
     def is_due(self) -> bool:
-        """Returns whether an event is due; if so, schedules the next event one period later."""
+        """Returns whether an event is due. If an event is due, schedules the next event."""
         now_s = time.monotonic()
         if now_s < self._due_s:
             return False
@@ -39,7 +39,7 @@ class WallRate:
         return True
 
     def rest(self, duration_s: float) -> None:
-        """Postpones the next event such that it is at least `duration_s` from now [s]."""
+        """Postpones the next event, so that it is due after `duration_s` from now at the earliest [s]."""
         self._due_s = max(self._due_s, time.monotonic() + duration_s)
 
 
@@ -50,7 +50,7 @@ class WallTimer:
 
     Args:
         hz: The rate [Hz].
-        action: The function.
+        action: Function without arguments that is called.
     """
 
     def __init__(self, hz: float, action: Callable[[], None]) -> None:
@@ -61,7 +61,7 @@ class WallTimer:
         threading.Thread(target=self._run, name="wall timer", daemon=True).start()
 
     def stop(self) -> None:
-        """Prevents further calls of the function; a running call completes."""
+        """Prevents further calls of the function. A call that has begun is completed."""
         self._ended.set()
 
     def _run(self) -> None:
@@ -77,12 +77,12 @@ class WallTimer:
 class ThrottledWarning:
     """Logs warnings about subjects, such as topics, and suppresses frequent repetitions.
 
-    A message of a new kind is logged at once. Other messages about the same subject are logged at most once per period;
-    suppressed messages are counted. Two messages are of the same kind if they only differ in numbers.
+    The first message of each kind about a subject is logged at once. Later messages about the subject are logged at
+    most once per period; suppressed messages are counted. Messages that only differ in numbers are of the same kind.
 
     Args:
         period_s: The period, in wall time [s].
-        max_kinds: Largest number of kinds per subject. Further kinds do not count as new.
+        max_kinds: Largest number of kinds per subject. First messages of further kinds are not logged at once.
     """
 
     def __init__(self, period_s: float = 5.0, max_kinds: int = MAX_KINDS) -> None:

@@ -1,8 +1,8 @@
 """All uses of rospy's private parts in this workspace.
 
-These uses are needed since rospy cannot send to many subscribers from one thread without waiting, cannot register again
-with a restarted ROS master, and sometimes confuses connections. Each use is tested when a node starts. If rospy has
-unexpected internals, a warning names the expected part, the difference and the function that is lost. Then the node
+The private parts are used since rospy cannot send to many subscribers from one thread without waiting, cannot register
+again with a restarted ROS master, and sometimes confuses connections. Each use is tested when a node starts. If rospy
+has unexpected internals, a warning names the expected part, the difference and the function that is lost. The node then
 continues without this function.
 """
 

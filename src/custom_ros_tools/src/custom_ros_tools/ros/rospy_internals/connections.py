@@ -16,9 +16,9 @@ from .expecting import expecting
 
 
 def close_poller_with(topic: rospy.topics.Topic) -> None:
-    """Makes rospy free the poller of a topic's connections, which holds a file, as soon as the topic is closed.
+    """Makes rospy free the poller of a topic's connections, and its file handle, as soon as the topic is closed.
 
-    Otherwise the poller, which references its own methods, stays until Python's garbage collector runs.
+    The poller references its own methods. Without this change, it would stay until Python's garbage collector runs.
     """
     # If rospy lacks these parts, the file only stays open longer.
     poller = getattr(getattr(topic, "impl", None), "connection_poll", None)
@@ -36,7 +36,7 @@ def _call(method: WeakMethod, *arguments: Any) -> Any:
 def keep_accepting() -> None:
     """Makes rospy use a `ServerSocket`, so that a slow client does not block other clients.
 
-    Call it before `rospy.init_node`.
+    Call this function before `rospy.init_node`.
     """
 
     def wrap() -> None:
@@ -52,10 +52,10 @@ def keep_accepting() -> None:
 
 
 def keep_new_connections() -> None:
-    """Makes rospy remove only closed connections from topics. Call it before `rospy.init_node`.
+    """Makes rospy remove only closed connections from topics. Call this function before `rospy.init_node`.
 
     rospy identifies a connection by its file number. After a connection is closed, a new connection may get the same
-    number. Then rospy may remove the new connection, and its subscriber waits forever or is disconnected.
+    number. If rospy then removes the new connection, the subscriber waits forever or is disconnected.
     """
 
     def wrap() -> None:
@@ -85,7 +85,7 @@ def keep_new_connections() -> None:
 def _remove_connection(topic: Any, connections: list[Any], ended: Any) -> None:
     """Closes the connection `ended` of a topic, and removes it from a list.
 
-    The list may contain the connection itself, or a queue that wraps the connection.
+    The list contains either the connection itself, or a queue that wraps the connection.
     """
     if not ended.done:  # otherwise the file is closed, and another connection may have the same number
         with suppress(OSError, TypeError, ValueError):  # the connection was not polled

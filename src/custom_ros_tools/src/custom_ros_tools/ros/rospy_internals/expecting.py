@@ -13,11 +13,11 @@ T = TypeVar("T")
 def expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
     """Calls a function that uses private parts of rospy. If it raises an error, logs a warning and returns None.
 
-    While rospy shuts down, the warning is not logged, since errors are expected then.
+    While rospy shuts down, the warning is not logged, since errors are normal during the shutdown.
 
     Args:
-        expected: Words for the expected parts, for the warning.
-        loss: Words for what does not work without these parts, for the warning.
+        expected: Description of the expected parts, for the warning.
+        loss: Description of the consequence if these parts are missing, for the warning.
         use: The function.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Replaces rospy's handling of registrations at the ROS master, of reported publishers and of cached parameters."""
+"""Replaces rospy's handling of registrations and reported publishers, and sets cached parameters."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .expecting import expecting
 class Subscriptions:
     """Connects the subscriptions of this node to all publishers that the ROS master has reported.
 
-    rospy itself has two faults. It only handles the last report about each topic, although reports may arrive out of
-    order. It also counts closed connections, so that it does not reconnect to a publisher after a lost connection.
+    rospy itself has two faults. First, it only handles the last report about each topic, although reports may arrive
+    out of order. Second, it counts closed connections, and therefore does not reconnect after a connection is lost.
 
     Args:
-        manager: rospy's receiver of the reports, which is redirected to this object.
+        manager: rospy's object that receives the reports. From now on, this object receives them instead.
         topics: rospy's topic manager.
     """
 
@@ -30,14 +30,14 @@ class Subscriptions:
         self._lock = threading.Lock()
         self._reports = count()
         self._reported: dict[tuple[str, str], int] = {}
-        """Number of the last report of each topic and publisher."""
+        """Number of the last report about each pair of topic and publisher address."""
         self._connecting: set[tuple[str, str]] = set()
         if not callable(manager.publisher_update):
             raise TypeError("RegManager.publisher_update is no method")
         manager.publisher_update = self.on_report
 
     def on_report(self, topic: str, publishers: list[str]) -> None:
-        """Handles a report: connects a subscription to publishers, and keeps existing connections.
+        """Connects a subscription to the publishers in a report of the master. Existing connections are kept.
 
         Args:
             topic: Name of the topic.
@@ -48,7 +48,7 @@ class Subscriptions:
         self.connect_missing()
 
     def connect_missing(self) -> None:
-        """Starts threads that connect to all reported publishers without a connection; does not wait for them."""
+        """Starts a thread for each reported publisher without a connection, which connects; returns at once."""
         with self._lock:
             missing = [pair for pair in self._reported if pair not in self._connecting and not self._has(*pair)]
             self._connecting.update(missing)
@@ -65,7 +65,7 @@ class Subscriptions:
         return bool(subscription.has_connection(uri))
 
     def _connect(self, topic: str, uri: str) -> None:
-        """Connects to a publisher. After a refusal, waits until the master reports the publisher again."""
+        """Connects to a publisher. If the publisher refuses, does not retry before the master reports it again."""
         pair, code = (topic, uri), 0
         report = self._reported.get(pair)
         try:
@@ -102,7 +102,7 @@ class Registry:
 
     @contextmanager
     def entries(self) -> Iterator[list[tuple[str, str, str]]]:
-        """Yields all topics and services, which do not change within the context.
+        """Context that yields all topics and services, and prevents changes to them.
 
         Each entry has three texts: kind (`sub`, `pub` or `srv`), name, and type of the topic or address of the service.
         """
@@ -118,7 +118,7 @@ class Registry:
             self._rospys.cond.notify_all()
 
     def hand_over(self, listener: Any) -> None:
-        """Makes rospy call another object for registrations, instead of its own.
+        """Makes rospy call a given object for registrations, instead of rospy's own object.
 
         Args:
             listener: Object with the methods `reg_added` and `reg_removed`, such as `Registrations`.
@@ -128,7 +128,7 @@ class Registry:
 
 
 def registry() -> Registry | None:
-    """Makes the registry of this node; returns None, after a warning, if rospy has unexpected internals."""
+    """Makes the registry of this node. If rospy has unexpected internals, logs a warning and returns None."""
     return expecting(
         "rospy.impl.registration to have RegManager among its listeners",
         "a restarted ROS master will not know this node: restart the node then",

@@ -1,4 +1,4 @@
-"""Makes publishers send to many subscribers without waiting, and keep longer queues for recorders."""
+"""Makes publishers send to many subscribers without waiting, and use longer queues for recorders."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .expecting import expecting
 class DirectSending:
     """Makes a publisher send in the publishing thread, through `BufferedSocket`s.
 
-    With a queue size, rospy passes every message to a separate thread for each subscriber. At 1 kHz with a few
-    subscribers, these threads compete for Python's lock, which costs more time than the simulation. Without a queue
-    size, rospy sends in the publishing thread, but a subscriber that does not read blocks the publisher.
+    rospy itself passes every message to a separate thread for each subscriber if a queue size is set. At 1 kHz with a
+    few subscribers, these threads compete for Python's global lock, which costs more time than the simulation. Without
+    a queue size, rospy sends in the publishing thread, but a subscriber that does not read blocks the publisher.
 
     Args:
         publisher: The publisher.
@@ -35,7 +35,7 @@ class DirectSending:
 
     @classmethod
     def of(cls, publisher: rospy.Publisher, limit: int) -> DirectSending | None:
-        """Makes the sender for a publisher; returns None, without changes, if rospy has unexpected internals.
+        """Makes the sender for a publisher. If rospy has unexpected internals, returns None without any change.
 
         Args:
             publisher: The publisher.
@@ -52,7 +52,7 @@ class DirectSending:
         return cls(publisher, limit) if cls._is_possible else None
 
     def wrap_connections(self) -> None:
-        """Replaces the sockets of new connections by `BufferedSocket`s. Call it before publishing each message."""
+        """Replaces the sockets of new connections by `BufferedSocket`s. Call before publishing each message."""
         connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             for connection in connections:
@@ -62,7 +62,7 @@ class DirectSending:
 
     @classmethod
     def _try(cls, publisher: rospy.Publisher) -> bool:
-        """Tests the replacement of a socket, on a topic that is not registered.
+        """Tests the replacement of a socket on a topic that is not registered at the ROS master.
 
         Raises:
             Exception: If the replacement does not work.
@@ -90,13 +90,13 @@ class DirectSending:
 
 
 class RecorderQueues:
-    """Gives recorders longer queues in a publisher, since recorders need all messages.
+    """Makes the queues of a publisher longer for recorders, since recorders need all messages.
 
     A recorder is a node whose name begins with `record`, such as `rosbag record`.
 
     Args:
-        publisher: A publisher with a queue size, which continues to apply to other subscribers.
-        limit: Queue size for recorders; if more messages wait, the oldest are dropped.
+        publisher: A publisher with a queue size. For other subscribers, the queue size does not change.
+        limit: Queue size for recorders. If more messages wait, the oldest messages are dropped.
     """
 
     def __init__(self, publisher: rospy.Publisher, limit: int) -> None:
@@ -104,7 +104,7 @@ class RecorderQueues:
         self._connections: Any = None
 
     def extend(self) -> None:
-        """Sets the queue size for new recorders. Call it before publishing each message."""
+        """Sets the queue size for new recorders. Call before publishing each message."""
         connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             self._connections = connections
