@@ -67,11 +67,11 @@ def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
 class MarkerNodeConfig(ConfigModel):
     """Topic and rate of a published marker, and whether its pose is broadcast on TF."""
 
-    topic_name: TopicName = Field(description="Topic of the visualization_msgs/Marker.")
-    hz: Hz = Field(50.0, description="Rate at which it is published, in wall time.")
-    broadcast_offset: Switch = Field(False, description="Whether the marker's pose is published on TF, too.")
+    topic_name: TopicName = Field(description="Topic of the marker, a visualization_msgs/Marker.")
+    hz: Hz = Field(50.0, description="Rate of the marker, in wall time.")
+    broadcast_offset: Switch = Field(False, description="Whether the marker's pose is also published on TF.")
     child_frame_id: FrameId | None = Field(
-        None, description="TF frame at the marker; required with `broadcast_offset`."
+        None, description="TF frame at the marker's pose; required with `broadcast_offset`."
     )
 
     @model_validator(mode="after")
@@ -84,29 +84,37 @@ class MarkerNodeConfig(ConfigModel):
 class MarkerConfig(ConfigModel):
     """A marker at a fixed pose in a TF frame."""
 
-    node: MarkerNodeConfig = Field(description="Topic and rate.")
-    frame_id: FrameId = Field("map", description="TF frame that it is attached to.")
+    node: MarkerNodeConfig = Field(description="Topic and rate of the marker.")
+    frame_id: FrameId = Field("map", description="TF frame to which the marker is attached.")
     type: Annotated[
         str, _one_of(MARKER_TYPES, "type"), _in_any_case(MARKER_TYPES), Expects("the name of a marker type")
     ] = Field(
-        description="Constant of the message in any case: `cube`, `sphere`, `cylinder`, `arrow`, `mesh_resource`, ..."
+        description="Type of the marker, a constant of visualization_msgs/Marker in upper or lower case: `cube`, "
+        "`sphere`, `cylinder`, `arrow`, `mesh_resource`, ..."
     )
     action: Annotated[
         str, _one_of(MARKER_ACTIONS, "action"), _in_any_case(MARKER_ACTIONS), Expects("the name of a marker action")
-    ] = Field("ADD", description="Constant of the message in any case: `add`, `modify`, `delete` or `deleteall`.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Position in that frame.")
+    ] = Field(
+        "ADD",
+        description="Action of the marker, a constant of visualization_msgs/Marker in upper or lower case: `add`, "
+        "`modify`, `delete` or `deleteall`.",
+    )
+    position: Position = Field((0.0, 0.0, 0.0), description="Position of the marker in `frame_id`.")
     orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = Field(
         (0.0, 0.0, 0.0),
-        description="Roll, pitch, yaw or a quaternion x, y, z, w in that frame.",
+        description="Orientation of the marker in `frame_id`: roll, pitch, yaw, or a quaternion x, y, z, w.",
     )
-    ori_in_deg: Switch = Field(False, description="Whether roll, pitch and yaw are in degrees, else in radians.")
-    rgba: Rgba = Field((0.0, 0.0, 1.0, 0.9), description="Colour and opacity, each from 0 to 1.")
+    ori_in_deg: Switch = Field(False, description="Whether roll, pitch and yaw are in degrees, otherwise in radians.")
+    rgba: Rgba = Field(
+        (0.0, 0.0, 1.0, 0.9), description="Colour and opacity: red, green, blue and alpha, each from 0 to 1."
+    )
     scale: Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)] = Field(
-        description="Size along x, y and z in m, or factors on a mesh."
+        description="Size along x, y and z [m], or scale factors of a mesh."
     )
     mesh_resource: Text | None = Field(
         None,
-        description="Mesh as `package://`, `{package}/`, `file://`, `http://` or absolute path; required for a mesh.",
+        description="Mesh file: `package://`, `{package}/`, `file://`, `http://` or an absolute path; required for "
+        "`mesh_resource`.",
     )
 
     @model_validator(mode="after")
@@ -136,26 +144,33 @@ class MarkerConfig(ConfigModel):
 class StartParameters(ConfigModel):
     """Parameters of a node that can be switched on and off."""
 
-    start_on_init: Switch = Field(False, description="Whether it is on from the start.")
+    start_on_init: Switch = Field(False, description="Whether the node is switched on at the start.")
 
 
 class RateParameters(ConfigModel):
     """Parameters of a node that publishes a message at a fixed rate."""
 
-    hz: Hz = Field(100.0, description="Rate of the message, in wall time.")
+    hz: Hz = Field(100.0, description="Rate of the published message, in wall time.")
 
 
 class RemappedJoint(ConfigModel):
     """Conversion of a joint from the simulator to a driver: `sign * factor of the unit * position + offset`."""
 
-    joint: Text = Field(description="The joint in the simulator.")
-    rename: Text | None = Field(None, description="Its name at the driver; by default the same.")
+    joint: Text = Field(description="Name of the joint in the simulator.")
+    rename: Text | None = Field(
+        None, description="Name of the joint at the driver. By default, the name in the simulator."
+    )
     unit: Literal["rad", "deg", "m", "mm"] = Field(
         "rad",
-        description="The driver's unit of positions, and of velocities per second; rad and m leave numbers unchanged.",
+        description="Unit of positions at the driver; velocities are in the same unit per second. `rad` and `m` "
+        "leave numbers unchanged.",
     )
-    sign: Literal[1, -1] = Field(1, description="-1 if the driver's direction is opposite; applies to efforts, too.")
-    offset: float = Field(0.0, description="The driver's position, in its unit, at position 0 of the simulator.")
+    sign: Literal[1, -1] = Field(
+        1, description="-1 if the joint has the opposite direction at the driver, also for efforts."
+    )
+    offset: float = Field(
+        0.0, description="Position at the driver, in `unit`, when the position in the simulator is 0."
+    )
 
     def conversion(self) -> JointConversion:
         """Makes the conversion from the simulator to the driver."""
@@ -165,9 +180,11 @@ class RemappedJoint(ConfigModel):
 class StartWithin(ConfigModel):
     """Condition for switching a node on: the robot must be near the first command, so that it does not jump."""
 
-    topic: Text = Field(description="Joint states of the commanded robot, in the names and units of the commands.")
+    topic: Text = Field(
+        description="Topic of the commanded robot's joint states, with the names and units of the commands."
+    )
     tolerance: Annotated[Positive, Unit("rad or m")] = Field(
-        0.05, description="Largest difference of a joint from its first command."
+        0.05, description="Largest distance of a joint from its first command."
     )
 
 
@@ -176,11 +193,16 @@ class RemapConfig(ConfigModel):
 
     joint_names: ListOf[Text] | None = Field(
         None,
-        description="Joints to forward in this order, under their names here; by default all, in the order received.",
+        description="Joints that are forwarded, by their names in received messages; defines their order. By "
+        "default, all joints in the order received.",
     )
     joints: ListOf[RemappedJoint] = Field((), description="Joints whose name or unit differs at the driver.")
-    inverse: Switch = Field(False, description="Whether `joints` is inverted: from the driver to the simulator.")
-    start_within: StartWithin | None = optional("Condition for switching on.")
+    inverse: Switch = Field(
+        False, description="Whether `joints` is applied inversely: from the driver to the simulator."
+    )
+    start_within: StartWithin | None = optional(
+        "Condition for switching the node on. By default, there is no condition."
+    )
 
     @model_validator(mode="after")
     def _joints_differ_in_name(self) -> RemapConfig:
@@ -207,7 +229,7 @@ def _require_unique(key: str, names: Iterable[str]) -> None:
 class FloatArrayConfig(RemapConfig):
     """Quantity, selection and order of the joint values that are published as an array."""
 
-    field: Literal["position", "velocity", "effort"] = Field("position", description="Quantity to publish.")
+    field: Literal["position", "velocity", "effort"] = Field("position", description="Quantity that is published.")
 
 
 NODE_CONFIGS: dict[str, type[ConfigModel]] = {

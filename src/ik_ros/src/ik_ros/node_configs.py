@@ -43,42 +43,80 @@ class RobotIKConfig(ConfigModel):
     Names are those of the fields of the message `CalculateInverseKinematicsProblem`.
     """
 
-    robot_name: Name = Field(description="The robot; its YAML has `start_ik_callback: true`.")
-    link_name: Text = Field(description="The link that is moved to the target.")
-    parent_frame_id: FrameId = Field(description="TF frame of the world.")
-    child_frame_id: FrameId = Field(description="TF frame that is the target.")
-    lowerLimits: ListOf[float] = Field((), description="One for each joint that a motor can move, as the next three.")
-    upperLimits: ListOf[float] = Field((), description="Requires the other three limits and ranges, too [rad or m].")
-    jointRanges: ListOf[float] = Field((), description="Range of each about its rest posture, relative to the others.")
-    resetPoses: ListOf[float] = Field((), description="Rest posture.")
-    jointDamping: ListOf[NonNegative] = Field((), description="Weight of the motion of each joint.")
-    solver: Literal[0, 1] = Field(0, description="0 damped least squares, 1 selectively damped least squares.")
-    maxNumIterations: Count = Field(0, description="Most iterations from one start; 0 is the robot's default.")
-    residualThreshold: NonNegative = Field(0.0, description="Distance at which the search stops [m].")
+    robot_name: Name = Field(description="Name of the robot, whose YAML file must contain `start_ik_callback: true`.")
+    link_name: Text = Field(description="Link that the robot moves to the target.")
+    parent_frame_id: FrameId = Field(description="TF frame of the simulated world.")
+    child_frame_id: FrameId = Field(description="TF frame that the link must reach.")
+    lowerLimits: ListOf[float] = Field(
+        (),
+        description="Lower position limit of each joint that a motor can move [rad or m]. Requires `upperLimits`, "
+        "`jointRanges` and `resetPoses`.",
+    )
+    upperLimits: ListOf[float] = Field(
+        (),
+        description="Upper position limit of each joint that a motor can move [rad or m]. Requires `lowerLimits`, "
+        "`jointRanges` and `resetPoses`.",
+    )
+    jointRanges: ListOf[float] = Field(
+        (), description="Range of each joint about its rest position, relative to the ranges of the other joints."
+    )
+    resetPoses: ListOf[float] = Field((), description="Rest position of each joint [rad or m].")
+    jointDamping: ListOf[NonNegative] = Field(
+        (), description="Reluctance of each joint to move, relative to the other joints."
+    )
+    solver: Literal[0, 1] = Field(0, description="0 for damped least squares, 1 for selectively damped least squares.")
+    maxNumIterations: Count = Field(
+        0, description="Largest number of iterations from one start; 0 selects the robot's default."
+    )
+    residualThreshold: NonNegative = Field(
+        0.0, description="Distance from the target below which the search stops [m]; 0 selects the robot's default."
+    )
 
 
 class TargetParameters(ConfigModel):
     """Parameters of nodes that publish data from TF: publication rate, and largest age of transforms."""
 
-    hz: Hz = Field(50.0, description="Rate of publication, in wall time.")
-    tf_timeout_s: Seconds = Field(0.5, description="Longest time without new TF; then nothing is published.")
+    hz: Hz = Field(50.0, description="Rate of the published messages, in wall time.")
+    tf_timeout_s: Seconds = Field(0.5, description="Time without new TF data after which publication pauses.")
 
 
 class SetupParameters(StartParameters, TargetParameters):
     """Parameters of a setup node, with the initial values of the problems that it publishes."""
 
-    parent_frame_id: FrameId | None = Field(None, description="TF frame that the target is in: the solver's base.")
-    child_frame_id: FrameId | None = Field(None, description="TF frame that is the target.")
-    init_bx: NonNegative = Field(0.0, description="Largest error along the target's x axis, both ways [m].")
-    init_by: NonNegative = Field(0.0, description="The same along y [m].")
-    init_bz: NonNegative = Field(0.0, description="The same along z [m].")
-    init_brx: NonNegative = Field(0.0, description="Largest rotation about its x axis, both ways [rad].")
-    init_bry: NonNegative = Field(0.0, description="The same about y [rad].")
-    init_brz: NonNegative = Field(0.0, description="The same about z [rad].")
-    goals: dict[Text, ListOf[float]] = Field({}, description="Initial goals of tasks whose goals change, by task.")
-    wait_for_start: Switch = Field(True, description="Whether the first problem waits for a start.")
-    max_num_prev_solutions: Count = Field(1, description="Number of previous solutions in a problem.")
-    seed: Count = Field(0, description="Seed of everything random in the solver.")
+    parent_frame_id: FrameId | None = Field(
+        None,
+        description="TF frame in which the target is given: the solver's base. By default, problems have no target "
+        "pose.",
+    )
+    child_frame_id: FrameId | None = Field(
+        None, description="TF frame that is the target. By default, problems have no target pose."
+    )
+    init_bx: NonNegative = Field(
+        0.0, description="Initial tolerance along the target's x axis, in both directions [m]."
+    )
+    init_by: NonNegative = Field(
+        0.0, description="Initial tolerance along the target's y axis, in both directions [m]."
+    )
+    init_bz: NonNegative = Field(
+        0.0, description="Initial tolerance along the target's z axis, in both directions [m]."
+    )
+    init_brx: NonNegative = Field(
+        0.0, description="Initial tolerance about the target's x axis, in both directions [rad]."
+    )
+    init_bry: NonNegative = Field(
+        0.0, description="Initial tolerance about the target's y axis, in both directions [rad]."
+    )
+    init_brz: NonNegative = Field(
+        0.0, description="Initial tolerance about the target's z axis, in both directions [rad]."
+    )
+    goals: dict[Text, ListOf[float]] = Field(
+        {}, description="Initial goals of tasks with variable goals, keyed by task name."
+    )
+    wait_for_start: Switch = Field(
+        True, description="Whether the first problem waits for a message with the start of the search."
+    )
+    max_num_prev_solutions: Count = Field(1, description="Number of previous solutions that a problem contains.")
+    seed: Count = Field(0, description="Seed of all random values of the solver.")
 
     @model_validator(mode="after")
     def _frames_go_together(self) -> SetupParameters:
@@ -94,28 +132,31 @@ class ExoticaSetupParameters(StartParameters, TargetParameters):
     """Parameters of the setup node for the solver `exotica`, as in the original package."""
 
     sync_tf_to_exotica_object: ListOf[Text] = Field(
-        (), description="Frames of the scene that follow TF: `TF_PARENT TF_CHILD SCENE_PARENT SCENE_FRAME` each."
+        (), description="Frames of the scene that follow TF, each as `TF_PARENT TF_CHILD SCENE_PARENT SCENE_FRAME`."
     )
-    max_num_prev_solutions: Count = Field(1, description="Number of previous solutions in a problem.")
+    max_num_prev_solutions: Count = Field(1, description="Number of previous solutions that a problem contains.")
 
 
 class SolverNodeParameters(StartParameters):
     """Private parameters of a solver node itself; all other private parameters are options of the solver."""
 
-    base_frame_id: str = Field("", description="TF frame of the solver's base; if empty, poses are not transformed.")
+    base_frame_id: str = Field("", description="TF frame of the solver's base. If empty, poses are not transformed.")
     continuity: JointRateLimiterConfig | None = Field(
-        None, description="Keeps targets within the velocities of the joints."
+        None,
+        description="Limits of the joint velocities between successive targets. By default, the targets are the "
+        "solutions.",
     )
 
 
 class TfToFloatArrayConfig(TargetParameters):
     """Parameters of the node that publishes a transform as an array of numbers."""
 
-    parent_frame_id: FrameId = Field(description="The frame that the pose is in.")
-    child_frame_id: FrameId = Field(description="The frame whose pose it is.")
+    parent_frame_id: FrameId = Field(description="TF frame in which the pose is given.")
+    child_frame_id: FrameId = Field(description="TF frame whose pose is published.")
     mode: Literal["pos", "pos+quat", "pos+eul"] = Field(
         "pos+quat",
-        description="x, y, z [m]; and then a quaternion x, y, z, w, or roll, pitch, yaw [rad], or nothing.",
+        description="Published numbers: `pos` is x, y, z [m]; `pos+quat` adds a quaternion x, y, z, w; `pos+eul` "
+        "adds roll, pitch, yaw [rad].",
     )
 
 

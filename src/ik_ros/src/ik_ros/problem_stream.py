@@ -18,15 +18,19 @@ class JointRateLimiterConfig(ConfigModel):
 
     max_velocity: Positive | dict[str, Positive] | None = Field(
         None,
-        description="Largest velocity of each joint, one for all or by joint [rad/s or m/s]; the URDF's if left out.",
+        description="Velocity limit [rad/s or m/s]: one for all joints, or a mapping from joint names to limits. By "
+        "default, the limits in the URDF.",
     )
-    velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Share of these velocities that is used.")
+    velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Fraction of the velocity limits that is used.")
     max_period_s: Positive = Field(
-        0.1, description="Longest pause between targets that counts [s]; after a longer one, a target moves no further."
+        0.1,
+        description="Longest time between two targets that is taken into account [s]: after a longer pause, a target "
+        "moves no further than after this time.",
     )
     hold: bool = Field(
         False,
-        description="Whether targets continue to the last solution, and stay there, while there is no solution.",
+        description="Whether targets continue to the last solution, and then stay there, while problems cannot be "
+        "solved.",
     )
 
 

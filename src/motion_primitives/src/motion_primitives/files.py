@@ -21,11 +21,11 @@ from .space import Space
 class PrimitiveFile(ConfigModel):
     """Content of a file with a learned primitive."""
 
-    type: Text = Field(description="Its type, a name of the table or `module:Class`.")
+    type: Text = Field(description="Type of the primitive: a name of the table of primitives, or `module:Class`.")
     options: dict[Text, Any] = Field({}, description="Options of the type.")
     names: ListOf[Text] = Field(min_length=1, description="Names of the positions.")
-    orientation: Switch = Field(False, description="Whether there is an orientation, too.")
-    learned: dict[Text, Any] = Field(description="What it has learned.")
+    orientation: Switch = Field(False, description="Whether points contain an orientation after the positions.")
+    learned: dict[Text, Any] = Field(description="Learned data, in the form of the type.")
 
 
 def save(primitive: Primitive, path: str | Path) -> None:

@@ -32,23 +32,25 @@ Bounds = Annotated[tuple[float, float], Field(strict=False)]
 class FrameSource(ConfigModel):
     """A TF frame whose pose over time is used as a demonstration."""
 
-    parent: FrameId = Field(description="The reference frame of the poses.")
-    child: FrameId = Field(description="The moving frame.")
+    parent: FrameId = Field(description="TF frame in which poses are given.")
+    child: FrameId = Field(description="TF frame whose motion is recorded.")
     orientation: Switch = Field(True, description="Whether orientations are part of the motion.")
 
 
 class JointSource(ConfigModel):
     """Joints whose positions over time are used as a demonstration."""
 
-    topic: TopicName = Field("joint_states", description="Topic of the joint states, in bags too.")
-    names: ListOf[Text] = Field(min_length=1, description="The joints, in the order of points.")
+    topic: TopicName = Field("joint_states", description="Topic of the joint states, also in bags.")
+    names: ListOf[Text] = Field(
+        min_length=1, description="Names of the joints, in the order of the positions in a point."
+    )
 
 
 class SourceConfig(ConfigModel):
     """Source of demonstrations: either a TF frame or joints."""
 
-    tf: FrameSource | None = optional("A TF frame.")
-    joints: JointSource | None = optional("Joints of a robot.")
+    tf: FrameSource | None = optional("TF frame as the source. Either this key or `joints` is required.")
+    joints: JointSource | None = optional("Joints of a robot as the source. Either this key or `tf` is required.")
 
     @model_validator(mode="after")
     def _is_one(self) -> SourceConfig:
@@ -67,39 +69,46 @@ class SourceConfig(ConfigModel):
 class FrameOutput(ConfigModel):
     """TF frame that is broadcast."""
 
-    parent: FrameId = Field(description="The reference frame of the poses.")
-    child: FrameId = Field(description="The moving frame.")
+    parent: FrameId = Field(description="TF frame in which poses are given.")
+    child: FrameId = Field(description="TF frame that is broadcast.")
 
 
 class JointOutput(ConfigModel):
     """Topic on which joint targets are published."""
 
-    topic: TopicName = Field("joint_states/target", description="Topic of the targets.")
+    topic: TopicName = Field("joint_states/target", description="Topic of the joint targets.")
 
 
 class SignalOutput(ConfigModel):
     """Topic on which the point or the velocity is published as an array of numbers."""
 
-    topic: TopicName = Field("primitive/signal", description="Topic of the numbers.")
+    topic: TopicName = Field("primitive/signal", description="Topic of the array of numbers.")
     content: Literal["position", "velocity"] = Field(
-        "position", description="The point, or its velocity; a velocity is 0 after the end."
+        "position",
+        description="Content of the array: the point or its velocity. The velocity is 0 after the end of the motion.",
     )
 
 
 class OutputConfig(ConfigModel):
     """Topics and TF frame to which executed motions are published; several can be used at the same time."""
 
-    tf: FrameOutput | None = optional("A TF frame, if the source is one.")
-    joints: JointOutput | None = optional("Joint targets, if the source are joints.")
-    signal: SignalOutput | None = optional("Numbers.")
+    tf: FrameOutput | None = optional(
+        "TF frame that is broadcast; requires a TF frame as the source. By default, no frame is broadcast."
+    )
+    joints: JointOutput | None = optional(
+        "Joint targets that are published; requires joints as the source. By default, no joint targets are published."
+    )
+    signal: SignalOutput | None = optional("Array of numbers that is published. By default, no array is published.")
 
 
 class ObstacleConfig(ConfigModel):
     """A ball that motions avoid."""
 
-    frame_id: FrameId = Field(description="TF frame of its centre.")
-    radius: PositiveMetres = Field(0.05, description="Its radius.")
-    range: PositiveMetres = Field(0.1, description="Distance from its surface at which the avoidance falls to 37 %.")
+    frame_id: FrameId = Field(description="TF frame at the centre of the ball.")
+    radius: PositiveMetres = Field(0.05, description="Radius of the ball.")
+    range: PositiveMetres = Field(
+        0.1, description="Distance from the ball's surface at which the avoidance has fallen to 37 %."
+    )
     gain: Positive = Field(1000.0, description="Strength of the avoidance.")
 
     def obstacle(self) -> ObstacleCoupling:
@@ -111,12 +120,14 @@ class CouplingConfig(ConfigModel):
     """Couplings with which an executed motion yields to forces and avoids obstacles."""
 
     force_stiffness: Annotated[Positive, Unit("N/m")] | None = optional(
-        "Stiffness with which positions yield to forces on `primitive/wrench`, in the axes of the source's parent."
+        "Stiffness with which positions yield to the forces on `primitive/wrench`, which are given in the axes of "
+        "the source's parent frame. By default, positions do not yield."
     )
     torque_stiffness: Annotated[Positive, Unit("N m/rad")] | None = optional(
-        "Stiffness with which orientations yield to its torques."
+        "Stiffness with which orientations yield to the torques on `primitive/wrench`; requires `force_stiffness`. "
+        "By default, orientations do not yield."
     )
-    obstacles: ListOf[ObstacleConfig] = Field((), description="Balls to avoid.")
+    obstacles: ListOf[ObstacleConfig] = Field((), description="Balls that the motion avoids.")
 
     def force(self, space: Space) -> ForceCoupling | None:
         """Makes the coupling to forces; returns None if `force_stiffness` is not configured."""
@@ -131,16 +142,20 @@ class PrimitivesNodeConfig(ConfigModel):
     """Configuration of the node that learns, plans and executes motions."""
 
     primitive: dict[Text, Any] = Field(
-        {"type": "dmp"}, description="Type of the primitive, a name or `module:Class`, with its options."
+        {"type": "dmp"}, description="Type of the primitive, a name or `module:Class`, and the options of this type."
     )
-    source: SourceConfig = Field(description="Signals of demonstrations.")
-    output: OutputConfig = Field(OutputConfig(), description="Outputs of executed motions.")
-    coupling: CouplingConfig = Field(CouplingConfig(), description="Couplings of an executed motion.")
+    source: SourceConfig = Field(description="Source of demonstrations.")
+    output: OutputConfig = Field(OutputConfig(), description="Outputs of an executed motion.")
+    coupling: CouplingConfig = Field(
+        CouplingConfig(), description="Reactions of an executed motion to forces and obstacles."
+    )
     bounds: dict[Text, Bounds] = Field(
-        {}, description="Least and largest position by name; a plan that leaves them is refused [m or rad]."
+        {},
+        description="Least and largest position [m or rad], keyed by position name. A plan that exceeds them is "
+        "refused.",
     )
     hz: Hz = Field(100.0, description="Rate at which TF is recorded and motions are executed, in wall time.")
-    folder: Text = Field("~/.ros/primitives", description="Folder of saved primitives.")
+    folder: Text = Field("~/.ros/primitives", description="Folder in which primitives are saved.")
 
     @model_validator(mode="after")
     def _fits_together(self) -> PrimitivesNodeConfig:

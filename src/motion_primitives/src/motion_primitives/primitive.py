@@ -81,8 +81,9 @@ class PrimitiveConfig(ConfigModel):
 
     alpha: Positive = Field(
         25.0,
-        description="Damping of the spring that pulls to the motion, for a duration of 1 s; its stiffness is a quarter "
-        "of the square. With larger values, the motion follows more closely and yields less.",
+        description="Damping coefficient of the spring that pulls to the planned motion, for a duration of 1 s; the "
+        "spring's stiffness is a quarter of the square of this coefficient. With larger values, the motion follows "
+        "the plan more closely and yields less.",
     )
 
 

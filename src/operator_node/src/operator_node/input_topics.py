@@ -35,8 +35,8 @@ class InputParameters(ConfigModel):
 
     input_timeout_s: SecondsOrOff = Field(
         0.0,
-        description="Time without input after which it counts as lost; 0 waits forever, for devices that report "
-        "changes only.",
+        description="Time without a message after which the input counts as lost; 0 waits forever, for devices that "
+        "report only changes.",
     )
 
 

@@ -23,12 +23,12 @@ AXES = {"x": (HALF_TURN, 0.0, 0.0), "y": (0.0, 0.0, HALF_TURN), "z": (0.0, HALF_
 class InteractiveTargetConfig(ConfigModel):
     """Names, initial pose and handles of a TF frame that the user drags in RViz."""
 
-    parent_frame_id: FrameId = Field(description="Parent frame.")
-    child_frame_id: FrameId = Field(description="Its name.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Initial position.")
-    quat_xyzw: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Initial orientation.")
-    size_m: PositiveMetres = Field(0.2, description="Size of the handles.")
-    hz: Hz = Field(50.0, description="Rate at which it is broadcast, in wall time.")
+    parent_frame_id: FrameId = Field(description="TF frame in which the target is given.")
+    child_frame_id: FrameId = Field(description="TF frame of the target.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Initial position in the parent frame.")
+    quat_xyzw: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Initial orientation in the parent frame, x, y, z, w.")
+    size_m: PositiveMetres = Field(0.2, description="Size of the interactive marker's handles.")
+    hz: Hz = Field(50.0, description="Rate at which the target is broadcast, in wall time.")
 
 
 class InteractiveTarget:

@@ -21,24 +21,35 @@ Limits = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
 class TeleopConfig(ConfigModel):
     """Names of the moved frame and its parent, and limits of position and speed."""
 
-    target_frame_id: FrameId = Field(description="The frame that is moved.")
-    parent_frame_id: FrameId = Field("world", description="Parent frame; the frame starts at its origin.")
-    hz: Hz = Field(100.0, description="Rate at which it is moved and broadcast, in wall time.")
-    ros_time: Switch = Field(
-        False, description="Whether speeds count in ROS time, so that it is as slow as a simulation that is slow."
+    target_frame_id: FrameId = Field(description="TF frame that is moved.")
+    parent_frame_id: FrameId = Field(
+        "world", description="Parent frame. The moved frame starts at the origin of this frame."
     )
-    xlim: Limits = Field((-math.inf, math.inf), description="Least and largest x; 0 lies between them.")
-    ylim: Limits = Field((-math.inf, math.inf), description="Least and largest y.")
-    zlim: Limits = Field((-math.inf, math.inf), description="Least and largest z.")
+    hz: Hz = Field(100.0, description="Rate at which the frame is moved and broadcast, in wall time.")
+    ros_time: Switch = Field(
+        False, description="Whether the frame moves in ROS time, so that it moves slowly when the simulation is slow."
+    )
+    xlim: Limits = Field(
+        (-math.inf, math.inf), description="Least and largest x of the frame in its parent; 0 must lie between them."
+    )
+    ylim: Limits = Field(
+        (-math.inf, math.inf), description="Least and largest y of the frame in its parent; 0 must lie between them."
+    )
+    zlim: Limits = Field(
+        (-math.inf, math.inf), description="Least and largest z of the frame in its parent; 0 must lie between them."
+    )
     max_speed: Annotated[Positive, Unit("m/s")] = Field(
-        2.0, description="Largest speed; faster signals are reduced to it."
+        2.0, description="Largest speed of the frame. A signal with a larger speed is scaled down."
     )
     max_turn_rate: Annotated[Positive, Unit("rad/s")] = Field(
-        2.0 * math.pi, description="Largest rate of roll, pitch and yaw, each; faster ones are reduced to it."
+        2.0 * math.pi,
+        description="Largest rate of roll, of pitch and of yaw. Each larger rate in a signal is reduced to this value.",
     )
 
     broadcast_always: Switch = Field(
-        False, description="Whether it is broadcast while it is switched off, too, so that others can move to it first."
+        False,
+        description="Whether the frame is also broadcast while the node is switched off, so that a robot can move to "
+        "the frame first.",
     )
 
     @model_validator(mode="after")

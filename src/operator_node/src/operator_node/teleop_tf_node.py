@@ -31,8 +31,7 @@ class TeleopParameters(StartParameters):
 
     input_timeout_s: SecondsOrOff = Field(
         0.5,
-        description="Time for which a signal stays in force when no other follows; then the frame stops. 0 means "
-        "forever.",
+        description="Time after the last signal at which the frame stops; 0 means that a signal never expires.",
     )
 
 

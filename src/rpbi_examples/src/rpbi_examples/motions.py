@@ -63,12 +63,12 @@ GRASP_HEIGHT, CARRY_HEIGHT = 0.025, 0.2
 class FigureEight(StartParameters):
     """A lemniscate of Gerono in the x-y plane of its frame."""
 
-    start_on_init: bool = Field(True, description="Whether it moves from the start.")
-    hz: Hz = Field(50.0, description="Rate at which its frame is broadcast.")
-    tf_ns: str = Field("", description="Prefix of the names of its frames, such as rpbi.")
-    width: NonNegative = Field(0.4, description="From end to end, along y [m].")
-    height: NonNegative = Field(0.2, description="Height of each loop, along x [m].")
-    period_s: Seconds = Field(10.0, description="Time of one round [s].")
+    start_on_init: bool = Field(True, description="Whether the frame moves from the start.")
+    hz: Hz = Field(50.0, description="Rate at which the frame is broadcast.")
+    tf_ns: str = Field("", description="Prefix of the frame names, such as rpbi.")
+    width: NonNegative = Field(0.4, description="Size of the figure along y [m].")
+    height: NonNegative = Field(0.2, description="Size of each loop along x [m].")
+    period_s: Seconds = Field(10.0, description="Duration of one round.")
 
     def position(self, time_s: float) -> Vector:
         """Returns the position on the figure at a time [s], in the figure's frame [m]."""

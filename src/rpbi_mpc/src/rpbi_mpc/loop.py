@@ -28,10 +28,14 @@ class LoopConfig(ConfigModel):
             next cycle has no new plan either, plant and loop stop.
     """
 
-    hz: Hz = Field(25.0, description="Cycles a second.")
-    delay_s: Annotated[NonNegative, Unit("s")] = Field(0.02, description="Time from a measurement to its command.")
+    hz: Hz = Field(25.0, description="Rate of the cycles.")
+    delay_s: Annotated[NonNegative, Unit("s")] = Field(
+        0.02, description="Time from a measurement until the resulting command acts, at most one cycle."
+    )
     max_missed: Annotated[int, Field(ge=0)] = Field(
-        5, description="Cycles that execute the last plan without a new one."
+        5,
+        description="Largest number of successive cycles without a new plan, which execute the last plan. Then the "
+        "loop stops.",
     )
 
     @model_validator(mode="after")

@@ -33,41 +33,51 @@ SAME_S = 1e-9
 class PlantConfig(ConfigModel):
     """Names and topics of slider and robot, and timing and limits of the plant."""
 
-    robot: Text = Field("nextage", description="Name of the robot whose targets are set, rpbi/NAME.")
+    robot: Text = Field("nextage", description="Name of the robot that receives the targets, NAME in rpbi/NAME.")
     joint_states: TopicName = Field(
-        "rpbi/nextage/joint_states", description="Topic of the positions of the joints; on hardware, the measured ones."
+        "rpbi/nextage/joint_states", description="Topic of the robot's joint states; on hardware, the measured ones."
     )
-    slider: Text = Field("box", description="Name of the slider in the world, for predictions.")
+    slider: Text = Field("box", description="Name of the slider in the simulated world, for predictions.")
     vicon: TopicName = Field(
         "vicon/box/box",
-        description="Topic of the pose of the slider's middle; in a stepped world, its frame on TF.",
+        description="Topic of the pose of the slider's middle. In a stepped world, the TF frame of this name is used "
+        "instead.",
     )
-    timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider is lost.")
+    timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider counts as lost.")
     ready: TopicName | None = optional(
-        "Topic whose first message shows that the robot is commanded; only with `timed`."
+        "Topic whose first message shows that the robot accepts commands; only with `timed`. By default, the node "
+        "does not wait for such a message."
     )
     max_lead: PositiveMetres = Field(
         0.06,
-        description="Distance of the hand from its target that stops it, for instance "
-        "because a guard has halted the robot.",
+        description="Distance of the hand from its target above which the plant stops, for instance because a guard "
+        "has halted the robot.",
     )
-    target_hz: Hz = Field(100.0, description="Rate of targets; a whole number of them is in each part of a cycle.")
+    target_hz: Hz = Field(
+        100.0,
+        description="Rate of the robot's targets. The delay and the period of the loop must be whole multiples of "
+        "the time between two targets.",
+    )
     timed: Switch = Field(
-        False, description="Whether the plant runs in real time, as hardware does; otherwise the world is stepped."
+        False,
+        description="Whether the plant runs in real time, as hardware does; otherwise the simulated world waits for "
+        "each plan.",
     )
 
 
 class PushingNodeConfig(ConfigModel):
     """Parameters of the node that pushes a slider along a path with a robot's hand."""
 
-    loop: LoopConfig = Field(LoopConfig(), description="Times of the loop.")
+    loop: LoopConfig = Field(LoopConfig(), description="Timing of the loop.")
     controller: Literal["program", "sampling"] = Field(
-        "program", description="Planner: a nonlinear program, or sampling in forks of a stepped world."
+        "program",
+        description="Planner: `program` solves a nonlinear program, `sampling` simulates candidates in forks of a "
+        "stepped world.",
     )
-    pushing: PushingConfig = Field(PushingConfig(), description="Slider, path, cost and solver.")
-    sampling: PushSamplingConfig = Field(PushSamplingConfig(), description="Candidates of the controller `sampling`.")
-    hand: PlanarHandConfig = Field(description="The hand that pushes.")
-    plant: PlantConfig = Field(PlantConfig(), description="Topics, and pace.")
+    pushing: PushingConfig = Field(PushingConfig(), description="Slider, path, cost, solver and limits of the push.")
+    sampling: PushSamplingConfig = Field(PushSamplingConfig(), description="Options of the controller `sampling`.")
+    hand: PlanarHandConfig = Field(description="Hand that pushes the slider.")
+    plant: PlantConfig = Field(PlantConfig(), description="Topics, names and timing of the plant.")
 
     @model_validator(mode="after")
     def _fits_together(self) -> PushingNodeConfig:
@@ -88,12 +98,12 @@ class PushingNodeConfig(ConfigModel):
 class SamplingNodeConfig(ConfigModel):
     """Parameters of the node that plans the commands of a robot by simulating candidate plans."""
 
-    loop: LoopConfig = Field(LoopConfig(hz=10.0), description="Times of the loop.")
-    sampling: SamplingConfig = Field(SamplingConfig(), description="Candidates, and the choice among them.")
-    command: InputConfig = Field(description="The targets that are commanded.")
+    loop: LoopConfig = Field(LoopConfig(hz=10.0), description="Timing of the loop.")
+    sampling: SamplingConfig = Field(SamplingConfig(), description="Horizon, knots and sampler of the candidates.")
+    command: InputConfig = Field(description="Input of the world that is commanded, with its limits.")
     cost: Text = Field(
-        description="Cost of a state, summed over all ticks: module:name of a function of the World, or of a class. "
-        "Its package is in trusted_packages of the world."
+        description="Cost of a state, which is summed over all ticks: `module:name` of a function of the World, or "
+        "of a class. The package must be in `trusted_packages` of the world."
     )
 
 

@@ -16,31 +16,33 @@ class GuardConfig(ConfigModel):
 
     policy: Literal["reject", "limit"] = Field(
         "reject",
-        description="Policy for unsafe targets: reject sends nothing and halts; limit sends a safe command instead,"
-        " and continues.",
+        description="Treatment of unsafe targets: `reject` sends no command and halts; `limit` sends a safe command "
+        "instead, and continues.",
     )
     on_halt: Literal["nothing", "brake"] = Field(
         "nothing",
-        description="Commands after a halt during a motion: none; or the braking that was found safe with the last"
-        " command, one command each period_s.",
+        description="Commands after a halt during a motion: `nothing` sends no commands; `brake` sends one command "
+        "each `period_s`, along the braking motion that was checked together with the last command.",
     )
     period_s: Annotated[Seconds, Field(ge=1e-5, le=10.0)] = Field(
         0.009,
-        description="Shortest time between two commands, and the time that each of them counts as. Choose a few percent"
-        " less than the time between two targets, so that the guard can catch up after late ones.",
+        description="Least time between two commands, which checks also assume as the duration of each command. "
+        "Choose a few percent less than the time between two targets, so that the guard can catch up after late "
+        "targets.",
     )
-    joint_names: ListOf[Text] = Field((), description="The joints that are guarded; by default all of the robot.")
+    joint_names: ListOf[Text] = Field((), description="Joints that are guarded. By default, all joints of the robot.")
     limits: LimitsConfig = Field(LimitsConfig(), description="Limits of the joints.")
     shape: ShapingConfig | None = optional(
-        "Smoothing of targets that joints cannot follow, before the checks; without it there is none."
+        "Smoothing, before the checks, of targets that joints cannot follow. By default, targets are not smoothed."
     )
     start_from: Literal["measured", "target"] = Field(
-        "measured", description="State of the robot before the first command: as measured, or the first target."
+        "measured",
+        description="State of the robot before the first command: the measured positions, or the first target.",
     )
     start_tolerance: NonNegative = Field(
-        0.05, description="Largest distance of the first target from the robot's position [rad or m]."
+        0.05, description="Largest distance of the first target from the robot's measured position [rad or m]."
     )
-    checks: dict[str, dict[str, Any]] = Field({}, description="Options of checks by name.")
+    checks: dict[str, dict[str, Any]] = Field({}, description="Options of the checks, keyed by check name.")
 
     @field_validator("joint_names", mode="before")
     @classmethod
@@ -56,27 +58,31 @@ class NodeConfig(ConfigModel):
     """Options of the guard's ROS node: message types, timeout of targets, and source of obstacles."""
 
     publish_as_joint_state: Switch = Field(
-        True, description="Whether commands are joint states; else bare numbers in the order of the joints."
+        True,
+        description="Whether commands are published as joint states, otherwise as arrays of positions in the order "
+        "of the joints.",
     )
     status_as_diagnostic: Switch = Field(
         False,
-        description="Whether robot_safety/status is a diagnostic_msgs/DiagnosticStatus, as the README of the authors'"
-        " release has it; else a safe_robot/Status.",
+        description="Whether robot_safety/status is a diagnostic_msgs/DiagnosticStatus, as in the README of the "
+        "authors' release; otherwise a safe_robot/Status.",
     )
     targets_are_states: Switch = Field(
         False,
-        description="Whether targets are joint states that are measured; only the positions of guarded joints count.",
+        description="Whether targets are measured joint states, of which only the positions of guarded joints are "
+        "used.",
     )
     silence_s: Seconds = Field(
         0.02,
-        description="Largest age of the newest target at which waiting targets are sent; beyond it, they wait for a"
-        " newer one. A source that has died is followed for no longer than this.",
+        description="Largest age of the newest target at which waiting targets are sent. If the newest target is "
+        "older, waiting targets are held until a new target arrives.",
     )
     base_frame: Text | None = Field(
         None,
-        description="TF frame of the robot's root, which markers are shown in; with it the check `environment` uses"
-        " the bodies of rpbi/markers.",
+        description="TF frame of the robot's root link, in which markers are published. With this key, the check "
+        "`environment` also uses the bodies of rpbi/markers. By default, the name of the root link in the URDF is "
+        "used for markers.",
     )
     left_out: ListOf[Text] = Field(
-        (), description="Bodies of rpbi/markers that are no obstacles, in particular the robot itself."
+        (), description="Bodies of rpbi/markers that are not obstacles, in particular the robot itself."
     )

@@ -19,15 +19,31 @@ PerJoint = Positive | dict[str, Positive]
 class LimitsConfig(ConfigModel):
     """Joint limits, which narrow the limits in the robot's URDF."""
 
-    lower: dict[str, float] = Field({}, description="Lower limits by joint [rad or m], above those of the URDF.")
-    upper: dict[str, float] = Field({}, description="Upper limits by joint [rad or m], below those of the URDF.")
-    position_factor: Factor = Field(1.0, description="Share of the range that is used, about its middle.")
-    velocity: PerJoint | None = Field(None, description="Largest speed [rad/s or m/s]; by default the URDF's.")
-    velocity_factor: Factor = Field(0.95, description="Share of the largest speed that is used.")
-    acceleration: PerJoint | None = Field(
-        None, description="Largest acceleration [rad/s^2 or m/s^2]; unlimited by default."
+    lower: dict[str, float] = Field(
+        {}, description="Lower position limits above those of the URDF [rad or m], keyed by joint name."
     )
-    jerk: PerJoint | None = Field(None, description="Largest jerk [rad/s^3 or m/s^3]; unlimited by default.")
+    upper: dict[str, float] = Field(
+        {}, description="Upper position limits below those of the URDF [rad or m], keyed by joint name."
+    )
+    position_factor: Factor = Field(
+        1.0, description="Fraction of each joint's range, about the middle of the range, that is used."
+    )
+    velocity: PerJoint | None = Field(
+        None,
+        description="Speed limit [rad/s or m/s]: one for all joints, or a mapping from joint names to limits. By "
+        "default, the limits in the URDF.",
+    )
+    velocity_factor: Factor = Field(0.95, description="Fraction of the speed limits that is used.")
+    acceleration: PerJoint | None = Field(
+        None,
+        description="Acceleration limit [rad/s^2 or m/s^2]: one for all joints, or a mapping from joint names to "
+        "limits. By default, accelerations are not limited.",
+    )
+    jerk: PerJoint | None = Field(
+        None,
+        description="Jerk limit [rad/s^3 or m/s^3]: one for all joints, or a mapping from joint names to limits. By "
+        "default, jerks are not limited.",
+    )
 
 
 class MotionLimits(NamedTuple):

@@ -39,18 +39,19 @@ class DMPConfig(PrimitiveConfig):
     bases: int = Field(30, ge=6, le=1000, description="Number of basis functions of each signal.")
     attractor: Literal["moving", "fixed"] = Field(
         "moving",
-        description="`moving`: it moves from start to goal and arrives in time. `fixed`: it is the goal, as in most "
-        "publications; the motion arrives some time after the duration.",
+        description="Point to which the spring pulls. `moving`: the point moves from start to goal, and the motion "
+        "arrives in time. `fixed`: the point is the goal, as in most publications, and the motion arrives some time "
+        "after the duration.",
     )
 
 
 class LearnedDMP(ConfigModel):
     """Learned data of a discrete dynamic movement primitive."""
 
-    start: ListOf[float] = Field(description="Mean first point.")
-    goal: ListOf[float] = Field(description="Mean last point.")
-    duration_s: Seconds = Field(description="Mean duration.")
-    weights: ListOf[ListOf[float]] = Field(description="Weights of the basis functions, a row for each signal.")
+    start: ListOf[float] = Field(description="Mean first point of the demonstrations.")
+    goal: ListOf[float] = Field(description="Mean last point of the demonstrations.")
+    duration_s: Seconds = Field(description="Mean duration of the demonstrations.")
+    weights: ListOf[ListOf[float]] = Field(description="Weights of the basis functions, with one row for each signal.")
 
 
 def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: MotionState) -> Array:

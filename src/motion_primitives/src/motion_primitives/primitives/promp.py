@@ -49,23 +49,27 @@ class ProMPConfig(PrimitiveConfig):
     bases: int = Field(20, ge=4, le=200, description="Number of basis functions of each signal.")
     prior: Positive = Field(
         1.0,
-        description="Weight of the prior of smooth deviations from the mean, as a number of demonstrations. With "
-        "larger values, motions reach new points more smoothly where demonstrations did not differ.",
+        description="Weight of the prior for smooth deviations from the mean, as an equivalent number of "
+        "demonstrations. Where demonstrations do not differ, larger values lead to smoother motions through new "
+        "points.",
     )
     reach: Positive = Field(
         2.0,
-        description="Largest distance of a motion from the demonstrated positions, as a multiple of their largest "
-        "extent; motions beyond it are refused.",
+        description="Largest distance of a motion from the demonstrated positions, as a multiple of the largest "
+        "extent of these positions. A motion that exceeds this distance is refused.",
     )
 
 
 class LearnedProMP(ConfigModel):
     """Learned data of a probabilistic movement primitive."""
 
-    origin: ListOf[float] = Field(description="Point whose orientation is the mean; positions are 0.")
+    origin: ListOf[float] = Field(
+        description="Reference point of the signals: the orientation is the demonstrations' mean, and all positions "
+        "are 0."
+    )
     duration_s: Seconds = Field(description="Mean duration of the demonstrations.")
     weights: ListOf[ListOf[ListOf[float]]] = Field(
-        description="Weights of the basis functions, for each demonstration a row for each signal."
+        description="Weights of the basis functions: for each demonstration, one row for each signal."
     )
 
 

@@ -32,18 +32,22 @@ class RhythmicDMPConfig(PrimitiveConfig):
     """Options of a rhythmic dynamic movement primitive."""
 
     bases: int = Field(30, ge=6, le=1000, description="Number of basis functions of each signal.")
-    period_s: Seconds | None = optional("Period of the demonstrations; by default from their autocorrelation.")
+    period_s: Seconds | None = optional(
+        "Period of the demonstrations. By default, computed from their autocorrelation."
+    )
 
 
 class LearnedRhythmicDMP(ConfigModel):
     """Learned data of a rhythmic dynamic movement primitive."""
 
-    center: ListOf[float] = Field(description="Centre of the motion.")
-    start: ListOf[float] = Field(description="Difference from the centre at which the cycle starts.")
-    start_rate: ListOf[float] = Field(description="Rate of this difference, per period.")
+    center: ListOf[float] = Field(description="Centre of the periodic motion.")
+    start: ListOf[float] = Field(description="Difference from the centre at the start of the cycle.")
+    start_rate: ListOf[float] = Field(
+        description="Rate of change of the difference from the centre at the start of the cycle, per period."
+    )
     period_s: Seconds = Field(description="Period of the demonstrations.")
     duration_s: Seconds = Field(description="Mean duration of the demonstrations.")
-    weights: ListOf[ListOf[float]] = Field(description="Weights of the basis functions, a row for each signal.")
+    weights: ListOf[ListOf[float]] = Field(description="Weights of the basis functions, with one row for each signal.")
 
 
 class RhythmicExecution(PathExecution):

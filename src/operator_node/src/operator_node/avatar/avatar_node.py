@@ -35,16 +35,18 @@ LOOKS_HZ = 20.0
 class AvatarParameters(ConfigModel):
     """Private parameters of `avatar_node.py`."""
 
-    robot_name: Name = Field("human", description="The avatar: a robot of the simulator with the joints of a person.")
-    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame in which the segments are given.")
+    robot_name: Name = Field("human", description="Name of the avatar: a simulated robot with the joints of a person.")
+    parent_frame_id: FrameId = Field(
+        "rpbi/world", description="TF frame in which the poses of the person's segments are given."
+    )
     base_frame_id: FrameId = Field("human/base", description="TF frame that the avatar's base follows.")
     place: Place3 | None = Field(
-        None, description="Initial place of the avatar: x, y [m], yaw [rad]; by default that of the person."
+        None, description="Initial place of the avatar: x, y [m], yaw [rad]. By default, the place of the person."
     )
     input_timeout_s: Seconds = Field(
-        0.5, description="Time without segments after which a warning reports that the avatar holds its pose."
+        0.5, description="Time without segment poses after which a warning reports that the avatar holds its pose."
     )
-    max_joint_speed: Positive = Field(10.0, description="Largest speed of each hinge [rad/s].")
+    max_joint_speed: Positive = Field(10.0, description="Largest speed of each joint [rad/s].")
     max_speed: Positive = Field(3.0, description="Largest speed of the pelvis [m/s].")
     max_angular_speed: Positive = Field(6.0, description="Largest angular speed of the pelvis [rad/s].")
 

@@ -21,7 +21,7 @@ QUEUE_SIZE = 100
 class SegmentForcesParameters(ConfigModel):
     """Private parameters of `segment_forces_node.py`."""
 
-    robot_name: Name = Field("human", description="The avatar; its YAML needs `contacts`.")
+    robot_name: Name = Field("human", description="Name of the avatar, whose YAML file must contain `contacts`.")
 
 
 class SegmentForcesNode:

@@ -39,10 +39,13 @@ class FeedConfig(ConfigModel):
 
     autorepeat_rate: HzOrOff = Field(
         20.0,
-        description="Rate at which an unchanged reading is repeated, so that subscribers know that it is still valid.",
+        description="Rate at which an unchanged reading is published again, so that subscribers know that the "
+        "reading is still valid; 0 disables repetition.",
     )
     coalesce_interval: NonNegative = Field(
-        0.001, description="Time during which motions are merged into one reading; buttons are published at once [s]."
+        0.001,
+        description="Time within which motions are merged into one message [s]; changes of buttons are published at "
+        "once.",
     )
 
 

@@ -33,15 +33,13 @@ SENDING_S = 0.1
 class DeviceParameters(ConfigModel):
     """Selection of the input device that the node reads."""
 
-    device: Text = Field(description="A name of the table, or `their_package.module:Class`.")
+    device: Text = Field(description="Device: a name of the table of devices, or `package.module:Class`.")
 
 
 class CueConfig(ConfigModel):
     """Scale of the forces that an input device renders, for example by rumbling."""
 
-    cue_full_scale: Positive = Field(
-        20.0, description="Force that is rendered with the full strength of the device [N]."
-    )
+    cue_full_scale: Positive = Field(20.0, description="Force that the device renders with full strength [N].")
 
 
 class DeviceNode:

@@ -35,16 +35,22 @@ class JoystickConfig(ConfigModel):
     """
 
     dev: Annotated[Text, AfterValidator(_numbered)] = Field(
-        "/dev/input/js0", description="Path whose number selects the joystick; the first one is 0."
+        "/dev/input/js0", description="Path whose number selects the joystick; `/dev/input/js0` selects the first one."
     )
-    dev_name: Text | None = optional("Part of the name of the joystick; the first match is used instead of `dev`.")
-    deadzone: float = Field(0.05, ge=0.0, lt=1.0, description="Share of the range of an axis that counts as 0.")
-    sticky_buttons: Switch = Field(False, description="Whether a button changes its state each time it is pressed.")
+    dev_name: Text | None = optional(
+        "Part of the joystick's name. By default, `dev` selects the joystick; otherwise the first joystick with a "
+        "matching name is used."
+    )
+    deadzone: float = Field(0.05, ge=0.0, lt=1.0, description="Fraction of an axis's range that counts as 0.")
+    sticky_buttons: Switch = Field(
+        False, description="Whether a button changes between 0 and 1 each time it is pressed."
+    )
     triggers: ListOf[Count] | None = optional(
-        "Indices of the axes that rest at one end, at 1; by default those of a gamepad that SDL knows."
+        "Indices of the axes that are 1 at rest, such as triggers. By default, the triggers of a gamepad that SDL "
+        "knows."
     )
     virtual: Switch = Field(
-        False, description="Whether to create a virtual gamepad, which the topic `joy/virtual` moves."
+        False, description="Whether a virtual gamepad is created, which messages on `joy/virtual` move."
     )
 
 

@@ -20,19 +20,21 @@ Milliseconds = Annotated[Positive, Unit("ms")]
 class KeyboardConfig(ConfigModel):
     """Keys that act as axes and buttons, repetition of keys, and source of the keys (window or terminal)."""
 
-    axes: ListOf[KeyPair] = Field((), description="Negative and positive key of each axis of `joy`.")
-    buttons: ListOf[KeyName] = Field((), description="Key of each button of `joy`.")
-    allow_repeat: Switch = Field(
-        False, description="Whether a key that is held is reported as going down again and again."
+    axes: ListOf[KeyPair] = Field(
+        (), description="Two keys for each axis of `joy`: the key that makes the axis -1 and the key that makes it 1."
     )
-    repeat_delay: Milliseconds = Field(500.0, description="Time for which a key is held before it repeats.")
-    repeat_interval: Milliseconds = Field(30.0, description="Period of the repetition.")
+    buttons: ListOf[KeyName] = Field((), description="One key for each button of `joy`.")
+    allow_repeat: Switch = Field(False, description="Whether a held key repeatedly reports that it went down.")
+    repeat_delay: Milliseconds = Field(500.0, description="Time until a held key begins to repeat.")
+    repeat_interval: Milliseconds = Field(30.0, description="Time between two repetitions of a held key.")
     terminal: Switch = Field(
         False,
-        description="Whether keys are read from the terminal instead of a window; a terminal does not report when a "
+        description="Whether keys are read from the terminal instead of a window. A terminal does not report when a "
         "key goes up.",
     )
-    terminal_hold_s: Seconds = Field(0.6, description="Time for which a key typed in the terminal counts as held.")
+    terminal_hold_s: Seconds = Field(
+        0.6, description="Time for which a key that was typed in the terminal counts as held."
+    )
 
 
 class Keyboard(Device):

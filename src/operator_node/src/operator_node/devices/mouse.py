@@ -25,8 +25,10 @@ HELP = "drag: x, y    wheel: z    release: stop"
 class MouseConfig(ConfigModel):
     """Step width and return time of the wheel's axis."""
 
-    wheel_step: Fraction = Field(0.25, description="Distance that one notch of the wheel moves its axis.")
-    wheel_return_s: Seconds = Field(0.3, description="Time after the last notch at which that axis returns to 0.")
+    wheel_step: Fraction = Field(0.25, description="Change of the wheel's axis for each notch.")
+    wheel_return_s: Seconds = Field(
+        0.3, description="Time after the last notch at which the wheel's axis returns to 0."
+    )
 
 
 class Mouse(Device):

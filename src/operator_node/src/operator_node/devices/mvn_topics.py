@@ -42,8 +42,8 @@ RECENT_S = 5.0
 class MvnTopicsConfig(ConfigModel):
     """Private parameters of the node that publishes the people captured by MVN."""
 
-    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame of MVN's world.")
-    recording_folder: Text = Field("~/mvn", description="Folder for the files that `mvn/record` writes.")
+    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame that stands for MVN's world frame.")
+    recording_folder: Text = Field("~/mvn", description="Folder of the files that `mvn/record` writes.")
 
 
 class MvnTopics(DeviceTopics):

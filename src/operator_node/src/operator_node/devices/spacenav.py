@@ -45,17 +45,30 @@ class SpacenavConfig(ConfigModel):
     """Connection and scaling of a 6-D mouse; all parameters except `socket` are named as in ROS's `spacenav_node`."""
 
     socket: Text | None = optional(
-        f"Socket of the daemon; by default `$SPNAV_SOCKET`, then the one in `{SETTINGS}`, then `{SOCKET}`."
+        f"Socket of the daemon. By default, `$SPNAV_SOCKET`, otherwise the socket in `{SETTINGS}`, otherwise `{SOCKET}`."
     )
-    full_scale: Positive = Field(512.0, description="Raw value of the device at the end of an axis.")
-    linear_scale: Scale = Field(1.0, description="Factor of `spacenav/offset` and the twist, one or one for each axis.")
-    angular_scale: Scale = Field(1.0, description="Factor of `spacenav/rot_offset` and the twist, likewise.")
-    zero_when_static: Switch = Field(True, description="Whether all axes become 0 after a time without events.")
-    static_count_threshold: Count = Field(30, description="Length of that time [ms].")
+    full_scale: Positive = Field(512.0, description="Raw value of the device at which an axis is 1.")
+    linear_scale: Scale = Field(
+        1.0, description="Factor of `spacenav/offset` and of the linear velocity: one number, or one for each axis."
+    )
+    angular_scale: Scale = Field(
+        1.0,
+        description="Factor of `spacenav/rot_offset` and of the angular velocity: one number, or one for each axis.",
+    )
+    zero_when_static: Switch = Field(
+        True, description="Whether all axes become 0 after `static_count_threshold` without events."
+    )
+    static_count_threshold: Count = Field(30, description="Time without events after which axes become 0 [ms].")
     static_trans_deadband: NonNegative = Field(
-        0.1, description="Without `zero_when_static`: x, y and z become 0 after that time if all are smaller than this."
+        0.1,
+        description="Without `zero_when_static`, x, y and z become 0 after `static_count_threshold` without events "
+        "if all three magnitudes are below this value.",
     )
-    static_rot_deadband: NonNegative = Field(0.1, description="The same for the other three axes.")
+    static_rot_deadband: NonNegative = Field(
+        0.1,
+        description="Without `zero_when_static`, the three rotations become 0 after `static_count_threshold` without "
+        "events if all three magnitudes are below this value.",
+    )
 
 
 class Spacenav(Device):

@@ -41,15 +41,24 @@ class DeviceEnded(DeviceError):  # noqa: N818 (nothing went wrong)
 class HapticConfig(ConfigModel):
     """Options that all haptic devices have: force limit, workspace, and properties of the device and of a hand."""
 
-    max_force_n: Positive = Field(description="Largest force that is sent to it [N].")
-    workspace_m: PositiveMetres = Field(description="Radius of its workspace, the unit of the axes of `joy`.")
-    damping: NonNegative = Field(
-        3.0, description="Damping of the device with a hand on it, for Colgate's bound [N s/m]."
+    max_force_n: Positive = Field(description="Largest force that is sent to the device [N].")
+    workspace_m: PositiveMetres = Field(
+        description="Radius of the device's workspace; the axes of `joy` are displacements divided by this radius."
     )
-    max_speed: Positive = Field(3.0, description="Largest speed of a hand; faster readings are refused [m/s].")
-    max_acceleration: Positive = Field(200.0, description="Largest acceleration of a hand, for the leak bound [m/s^2].")
+    damping: NonNegative = Field(
+        3.0, description="Damping of the device together with a hand, for Colgate's bound on the stiffness [N s/m]."
+    )
+    max_speed: Positive = Field(
+        3.0, description="Largest speed of a hand [m/s]; readings with a larger speed are refused."
+    )
+    max_acceleration: Positive = Field(
+        200.0,
+        description="Largest acceleration of a hand, for the bound on the energy that the device can leak [m/s^2].",
+    )
     resolution_m: NonNegative = Field(
-        5e-5, description="Resolution of each measured axis, for the leak bound; 0 is exact [m]."
+        5e-5,
+        description="Resolution of each measured axis, for the bound on the energy that the device can leak [m]; 0 "
+        "means exact measurements.",
     )
 
 

@@ -21,10 +21,8 @@ QUEUE_SIZE = 100
 class LoggerParameters(ConfigModel):
     """Time span of the signals in a message, and rate at which messages are published."""
 
-    window_duration: Seconds = Field(1.0, description="Time span shown in the window.")
-    hz: HzOrOff = Field(
-        0.0, description="Rate at which the window is published, in wall time; 0 publishes it with each signal."
-    )
+    window_duration: Seconds = Field(1.0, description="Time span of the signals in the published window.")
+    hz: HzOrOff = Field(0.0, description="Rate of the window, in wall time; 0 publishes the window with each signal.")
 
 
 class InterfaceLogger:

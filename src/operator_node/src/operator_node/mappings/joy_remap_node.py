@@ -20,7 +20,7 @@ NAME = "joy_remap"
 class JoyRemapParameters(InputParameters):
     """Rate at which the newest message is repeated, and time without input after which zeros are sent."""
 
-    hz: Hz = Field(100.0, description="Rate, in wall time.")
+    hz: Hz = Field(100.0, description="Rate of the published message, in wall time.")
 
 
 class JoyRemap:

@@ -30,18 +30,22 @@ If a press arrives later and has an earlier stamp than the release, the clock wa
 class KeyboardToJoyConfig(ConfigModel):
     """Keys of a keyboard that act as the axes and buttons of a joystick."""
 
-    axes: ListOf[KeyPair] = Field(description="For each axis, the key that makes it -1 and the key that makes it 1.")
-    buttons: ListOf[KeyName] = Field((), description="The key of each button.")
+    axes: ListOf[KeyPair] = Field(
+        description="Two keys for each axis: the key that makes the axis -1 and the key that makes it 1."
+    )
+    buttons: ListOf[KeyName] = Field((), description="One key for each button.")
 
 
 class KeyboardToJoyParameters(ConfigModel):
     """Rate of the messages on `joy`, and longest time for which a key counts as held."""
 
-    hz: Hz = Field(100.0, description="Rate, in wall time; a key that goes down or up is published at once.")
+    hz: Hz = Field(
+        100.0, description="Rate of the published message, in wall time; changes of keys are published at once."
+    )
     key_timeout_s: SecondsOrOff = Field(
         0.0,
-        description="Time for which a key counts as held after it went down, for keyboards that repeat keys but may "
-        "miss a release; 0 means until it is released.",
+        description="Time for which a key counts as held after it went down, for keyboards that repeat held keys but "
+        "may miss a release; 0 waits for the release.",
     )
 
 

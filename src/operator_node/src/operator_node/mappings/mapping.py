@@ -14,14 +14,16 @@ class AxesConfig(ConfigModel):
     """Selection of a device's axes, and their dead zone."""
 
     axes_idx: ListOf[Count] = Field(
-        min_length=1, description="Indices of axes, from 0 on, in the order of the signal; one may occur twice."
+        min_length=1,
+        description="Indices of joystick axes, counted from 0, in the order of the signal. An index may occur twice.",
     )
 
     dead_zone: float = Field(
         0.0,
         ge=0.0,
         lt=1.0,
-        description="Share of the range of an axis that counts as 0; from there the axis rises to 1 at its end.",
+        description="Fraction of an axis's range that counts as 0. Beyond it, the value rises from 0 to 1 at the end "
+        "of the axis.",
     )
 
     def pick(self, axes: Sequence[float]) -> list[float]:

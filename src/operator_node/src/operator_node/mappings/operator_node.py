@@ -32,7 +32,9 @@ class OperatorParameters(StartParameters, InputParameters):
     """Private parameters of the nodes that map a device's axes to a signal."""
 
     repeat_hz: HzOrOff = Field(
-        20.0, description="Rate at which a nonzero signal is repeated while the input stays the same; 0 never repeats."
+        20.0,
+        description="Rate at which a nonzero signal is published again while the input does not change; 0 disables "
+        "repetition.",
     )
 
 

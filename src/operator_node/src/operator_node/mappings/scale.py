@@ -20,7 +20,7 @@ class ScaleConfig(AxesConfig):
         OneAsList,
         AlsoTakes({"type": "number"}),
         Expects("a number or a list of numbers"),
-    ] = Field((1.0,), description="Factors: one number for all axes, or one for each.")
+    ] = Field((1.0,), description="Factors of the axes: one number for all axes, or one for each.")
 
     @model_validator(mode="after")
     def _one_for_each(self) -> ScaleConfig:

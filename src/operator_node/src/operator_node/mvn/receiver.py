@@ -31,14 +31,18 @@ REMARK_PERIOD_S = 1.0
 class MvnConfig(ConfigModel):
     """Address and time-out of the stream from MVN, and the units and axes of its positions."""
 
-    host: Text = Field("127.0.0.1", description="Address to listen at; 0.0.0.0 also receives from other computers.")
-    port: int = Field(DEFAULT_PORT, ge=0, le=65_535, description="UDP port; 0 selects any free one.")
-    position_scale: Positive = Field(1.0, description="Factor of positions to metres; not applied to type 01.")
-    y_up: Switch = Field(False, description="Whether MVN sends type 02 with the y axis up.")
-    max_people: int = Field(
-        8, ge=1, le=256, description="Largest number of people; frames of further ones are refused."
+    host: Text = Field(
+        "127.0.0.1", description="Address at which the receiver listens; 0.0.0.0 also receives from other computers."
     )
-    timeout_s: Seconds = Field(0.5, description="Time without a frame after which the stream counts as gone.")
+    port: int = Field(DEFAULT_PORT, ge=0, le=65_535, description="UDP port; 0 selects any free port.")
+    position_scale: Positive = Field(
+        1.0, description="Factor from received positions to metres; messages of type 01 are not scaled."
+    )
+    y_up: Switch = Field(False, description="Whether the y axis points up in messages of type 02.")
+    max_people: int = Field(
+        8, ge=1, le=256, description="Largest number of people; frames of further people are refused."
+    )
+    timeout_s: Seconds = Field(0.5, description="Time without a frame after which the stream counts as lost.")
 
 
 class Silence(NamedTuple):

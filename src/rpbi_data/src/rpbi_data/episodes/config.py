@@ -19,25 +19,36 @@ _Index = Annotated[Count, Field(strict=False)]
 class RecordParameters(ConfigModel):
     """Parameters of `record_node.py`."""
 
-    folder: Text = Field(description="Folder of the episodes; it is created.")
+    folder: Text = Field(description="Folder of the episodes, which is created if necessary.")
     topics: ListOf[Text] | Text = Field(
-        DEFAULT_TOPICS, description="A list of topics, or a regular expression that the whole name matches."
+        DEFAULT_TOPICS,
+        description="Recorded topics: a list, or a regular expression that must match the whole name of a topic.",
     )
-    also: ListOf[Text] = Field((), description="Further topics, such as images of cameras.")
+    also: ListOf[Text] = Field((), description="Topics that are recorded in addition, such as camera images.")
     copy_from: ListOf[Text] = Field(
-        (), description="Further folders whose files are stored with episodes if the world names them; `[/]` for all."
+        (),
+        description="Folders from which files that the world uses are stored with episodes, in addition to the "
+        "default folders; `[/]` permits all folders.",
     )
     namespace: Text = Field("/", description="Namespace of the simulator.")
     reset: Switch = Field(False, description="Whether the world is reset before each episode.")
-    disk_reserve_mb: Positive = Field(1000.0, description="Free space of the disk that is never used [MB].")
+    disk_reserve_mb: Positive = Field(1000.0, description="Free disk space that recordings leave unused [MB].")
     seeds: str = Field("", description="Text that is stored with each episode.")
-    start_key: Text = Field("r", description="Key that starts an episode, and ends the one that is recorded.")
-    discard_key: Text = Field("x", description="Key that discards the episode that is recorded, else the last one.")
-    label_keys: dict[str, str] = Field(
-        {"s": "success", "f": "failure"}, description="Labels by the keys that give them to the same episode."
+    start_key: Text = Field("r", description="Key that starts an episode, or ends the episode that is being recorded.")
+    discard_key: Text = Field(
+        "x", description="Key that discards the episode that is being recorded, otherwise the last episode."
     )
-    start_button: Count | None = optional("Index of the button of `joy` with the effect of the start key.")
-    discard_button: Count | None = optional("Index of the button of `joy` with the effect of the discard key.")
+    label_keys: dict[str, str] = Field(
+        {"s": "success", "f": "failure"},
+        description="Labels, keyed by the key that gives the label to the episode that is being recorded, otherwise "
+        "to the last episode.",
+    )
+    start_button: Count | None = optional(
+        "Index of the `joy` button with the effect of `start_key`. By default, no button has it."
+    )
+    discard_button: Count | None = optional(
+        "Index of the `joy` button with the effect of `discard_key`. By default, no button has it."
+    )
     label_buttons: dict[_Index, str] = Field(
-        {}, description="Labels by the index, as text, of the button of `joy` that gives them."
+        {}, description="Labels, keyed by the index (as text) of the `joy` button that gives the label."
     )

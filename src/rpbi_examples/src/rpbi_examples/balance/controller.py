@@ -34,25 +34,32 @@ HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
 class BalanceConfig(ControllerConfig):
     """Configuration keys of the controller `Balance`."""
 
-    urdf_filename: ExistingFile = Field(description="The robot's URDF; `{package}/path` is resolved.")
-    hand: Text = Field(description="The link that reaches.")
+    urdf_filename: ExistingFile = Field(description="URDF file of the robot; `{package}/path` is accepted.")
+    hand: Text = Field(description="Link that is moved to the target.")
     point: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(
-        (0.0, 0.0, 0.0), description="The point of this link that is moved to the target, in the link's frame."
+        (0.0, 0.0, 0.0), description="Point of the link `hand` that is moved to the target, in the link's frame."
     )
-    torso: Text = Field(description="The link that stays upright.")
+    torso: Text = Field(description="Link that is kept upright.")
     soles: ListOf[Text] = Field(
-        min_length=1, description="Links whose frames are in the middle of the soles: x forward, z up."
+        min_length=1, description="Links of the feet, with frames in the middle of the soles: x forward, z up."
     )
     half_length: Annotated[NonNegative, Unit("m")] = Field(0.09, description="Half of the usable length of a sole.")
     half_width: Annotated[NonNegative, Unit("m")] = Field(0.055, description="Half of the usable width of a sole.")
-    friction: NonNegative = Field(0.5, description="Assumed coefficient of friction.")
-    period_ticks: int = Field(2, ge=1, description="Ticks between two solutions; efforts are constant in between.")
-    capture_gain: NonNegative = Field(3.0, description="Lead of the centre of pressure over the capture point's error.")
-    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(150.0, description="Stiffness of the hand, by mass.")
-    noise_seed: Annotated[int, Field(ge=0)] | None = optional(
-        "Seed of the noise of the measured base pose, which is also delayed. Default: the true pose."
+    friction: NonNegative = Field(0.5, description="Coefficient of friction that the controller assumes at the soles.")
+    period_ticks: int = Field(
+        2, ge=1, description="Number of ticks between two solutions; joint efforts are constant in between."
     )
-    hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's motion.")
+    capture_gain: NonNegative = Field(
+        3.0, description="Ratio of the centre of pressure's lead to the capture point's error."
+    )
+    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(
+        150.0, description="Stiffness of the hand's task, divided by mass."
+    )
+    noise_seed: Annotated[int, Field(ge=0)] | None = optional(
+        "Seed of the noise of the measured base pose, which is also delayed. By default, the controller uses the "
+        "true pose."
+    )
+    hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand.")
 
 
 class Balance(Controller):

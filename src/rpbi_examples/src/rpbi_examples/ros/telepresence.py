@@ -41,10 +41,14 @@ SEES_NOTHING_S = 1.0
 class TelepresenceParameters(ConfigModel):
     """Private parameters of `telepresence_node.py`."""
 
-    force_limit: Positive = Field(15.0, description="Sum of forces on the arm above which the cuff goes back [N].")
-    speed: Positive = Field(0.1, description="Speed of the cuff where nothing is touched [m/s].")
-    ready: str = Field("", description="Topic of the commands of a real robot, which are waited for; empty: none.")
-    out: str = Field("", description="File that the outcome is written to, as JSON; empty: none.")
+    force_limit: Positive = Field(15.0, description="Sum of the forces on the arm above which the cuff moves back [N].")
+    speed: Positive = Field(0.1, description="Speed of the cuff without contact [m/s].")
+    ready: str = Field(
+        "",
+        description="Topic of a real robot's commands; the node waits for the first message. If empty, the node does "
+        "not wait.",
+    )
+    out: str = Field("", description="JSON file for the outcome. If empty, no file is written.")
 
 
 class TelepresenceNode:

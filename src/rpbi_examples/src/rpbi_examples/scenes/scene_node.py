@@ -215,11 +215,13 @@ def _touch(point: Any) -> Touch:
 class SceneNodeConfig(ConfigModel):
     """Private parameters of `scene_node.py`."""
 
-    scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
-    seed: Count = Field(1, description="Seed of the first episode; each further one adds 1.")
-    episodes: Count = Field(0, description="Number of episodes; 0: until it is stopped.")
-    noise: schema.Switch = Field(False, description="Whether poses are sensed with noise and delay.")
-    real_time_factor: NonNegative = Field(1.0, description="Simulated seconds a second; 0: as fast as possible.")
+    scene: Text = Field(description="Scene: a name in `SCENES`, or `module:Class`.")
+    seed: Count = Field(1, description="Seed of the first episode; the seed increases by 1 with each episode.")
+    episodes: Count = Field(0, description="Number of episodes; 0 runs episodes until the node is stopped.")
+    noise: schema.Switch = Field(False, description="Whether measured poses have noise and delay.")
+    real_time_factor: NonNegative = Field(
+        1.0, description="Simulated seconds per second of wall time; 0 runs as fast as possible."
+    )
 
 
 def _run() -> None:

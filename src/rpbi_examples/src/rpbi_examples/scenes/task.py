@@ -45,13 +45,17 @@ TASK = "rpbi_examples.scenes.task:SceneTask"
 class SceneTaskConfig(WorldTaskConfig):
     """Options of `SceneTask`."""
 
-    scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
-    noise: schema.Switch = Field(False, description="Whether poses are sensed with noise and delay.")
-    low: Position = Field((-2.0, -2.0, -1.0), description="Lower corner of the region in which bodies are observed.")
-    high: Position = Field((2.0, 2.0, 3.0), description="Upper corner.")
-    speed: Fraction = Field(0.5, description="Largest speed of joints, as a share of the velocity limits of the URDF.")
-    hand_speed: Positive = Field(0.25, description="Largest speed of hands along each axis [m/s].")
-    turn_speed: Positive = Field(1.0, description="Largest speed of hands about each axis [rad/s].")
+    scene: Text = Field(description="Scene: a name in `SCENES`, or `module:Class`.")
+    noise: schema.Switch = Field(False, description="Whether measured poses have noise and delay.")
+    low: Position = Field(
+        (-2.0, -2.0, -1.0), description="Lower corner of the region in which bodies are observed, in the world frame."
+    )
+    high: Position = Field(
+        (2.0, 2.0, 3.0), description="Upper corner of the region in which bodies are observed, in the world frame."
+    )
+    speed: Fraction = Field(0.5, description="Largest joint speed, as a fraction of the velocity limits in the URDF.")
+    hand_speed: Positive = Field(0.25, description="Largest speed of a hand along each axis [m/s].")
+    turn_speed: Positive = Field(1.0, description="Largest angular speed of a hand about each axis [rad/s].")
 
 
 class SceneTask(WorldTask):

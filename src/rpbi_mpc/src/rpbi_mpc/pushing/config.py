@@ -39,18 +39,31 @@ class PushingConfig(ConfigModel):
         max_command: Largest speed of the pusher [m/s].
     """
 
-    slider: SliderConfig = Field(SliderConfig(), description="The slider.")
+    slider: SliderConfig = Field(SliderConfig(), description="The pushed box.")
     radius: PositiveMetres = Field(0.01, description="Radius of the pusher.")
-    path: PathConfig = Field(PathConfig(), description="The path.")
-    program: ProgramConfig = Field(ProgramConfig(), description="Horizon, cost and solver.")
-    estimator: EstimatorConfig = Field(EstimatorConfig(), description="Filter of measurements.")
-    approach: ApproachConfig = Field(ApproachConfig(), description="Motion of the pusher to the slider.")
-    gap_rate: Annotated[NonNegative, Unit("1/s")] = Field(5.0, description="Rate at which a gap is closed in contact.")
-    max_lag: PositiveMetres = Field(0.03, description="Distance ahead of the slider at which the reference waits.")
-    max_off: PositiveMetres = Field(0.15, description="Distance of the slider from the path at which the loop stops.")
-    tolerance: ToleranceConfig = Field(ToleranceConfig(), description="Largest errors of a successful push.")
-    settle_s: Annotated[NonNegative, Unit("s")] = Field(1.0, description="Time at the last pose of the path.")
-    cycle_s: Seconds = Field(0.04, description="Time of a cycle.")
-    lag_s: Annotated[NonNegative, Unit("s")] = Field(0.0, description="Delay of the pusher's motion.")
-    plan_cycles: Annotated[int, Field(ge=1)] = Field(6, description="Commands of a plan, one for each cycle.")
+    path: PathConfig = Field(PathConfig(), description="Path of the slider.")
+    program: ProgramConfig = Field(ProgramConfig(), description="Horizon, cost and solver of the nonlinear program.")
+    estimator: EstimatorConfig = Field(EstimatorConfig(), description="Gains of the filter for measurements.")
+    approach: ApproachConfig = Field(ApproachConfig(), description="Motion of the pusher to the slider before a push.")
+    gap_rate: Annotated[NonNegative, Unit("1/s")] = Field(
+        5.0, description="Ratio of the pusher's closing velocity to the gap between pusher and face during a push."
+    )
+    max_lag: PositiveMetres = Field(
+        0.03,
+        description="Largest lead of the reference over the slider, along the path. With a larger lead, the "
+        "reference waits.",
+    )
+    max_off: PositiveMetres = Field(
+        0.15, description="Distance of the slider from the path above which the task fails."
+    )
+    tolerance: ToleranceConfig = Field(ToleranceConfig(), description="Limits on the errors of a successful push.")
+    settle_s: Annotated[NonNegative, Unit("s")] = Field(
+        1.0, description="Time for which the reference stays at the end of the path before the task is done."
+    )
+    cycle_s: Seconds = Field(0.04, description="Duration of a cycle, in which one command acts.")
+    lag_s: Annotated[NonNegative, Unit("s")] = Field(
+        0.0,
+        description="Delay from a command to the resulting motion of the pusher, in addition to the delay of the loop.",
+    )
+    plan_cycles: Annotated[int, Field(ge=1)] = Field(6, description="Number of commands in a plan, one for each cycle.")
     max_command: Annotated[Positive, Unit("m/s")] = Field(0.2, description="Largest speed of the pusher.")

@@ -41,15 +41,19 @@ class PlanarHandConfig(ConfigModel):
         posture: Joint positions from which the first iteration starts [rad]. If empty, all positions are 0.
     """
 
-    urdf: Text = Field(description="URDF of the robot, a path or `{package}/path`.")
-    link: Text = Field(description="Link whose origin is moved; its axis z points down.")
-    joints: ListOf[Text] = Field(min_length=3, description="Joints that move it.")
+    urdf: Text = Field(description="URDF file of the robot: a path or `{package}/path`.")
+    link: Text = Field(description="Link whose origin is moved. The link's z axis points down.")
+    joints: ListOf[Text] = Field(min_length=3, description="Names of the joints that move the link.")
     base: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(
-        (0.0, 0.0, 0.0), description="Position of the root link in the world."
+        (0.0, 0.0, 0.0), description="Position of the robot's root link in the world."
     )
-    height: Annotated[float, Unit("m")] = Field(0.02, description="Height of the point in the world.")
-    yaw: Annotated[float, Unit("rad")] = Field(0.0, description="Angle of the link's x about the vertical.")
-    posture: ListOf[float] = Field((), description="Positions of the joints to start from; 0 without it.")
+    height: Annotated[float, Unit("m")] = Field(0.02, description="Height of the link's origin in the world.")
+    yaw: Annotated[float, Unit("rad")] = Field(
+        0.0, description="Angle about the vertical from the world's x axis to the link's x axis."
+    )
+    posture: ListOf[float] = Field(
+        (), description="Joint positions from which inverse kinematics start [rad]. If empty, all are 0."
+    )
 
 
 class PlanarHand:

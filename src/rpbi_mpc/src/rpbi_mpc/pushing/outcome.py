@@ -24,9 +24,15 @@ class ToleranceConfig(ConfigModel):
         tracking: Largest mean distance of the slider from the reference during the whole push [m].
     """
 
-    goal: PositiveMetres = Field(0.005, description="Largest distance of the slider from the end of the path.")
-    goal_rad: Annotated[Positive, Unit("rad")] = Field(0.26, description="Largest difference in yaw at the end.")
-    tracking: PositiveMetres = Field(0.015, description="Largest mean distance from the reference.")
+    goal: PositiveMetres = Field(
+        0.005, description="Largest distance of the slider from the end of the path, after the push."
+    )
+    goal_rad: Annotated[Positive, Unit("rad")] = Field(
+        0.26, description="Largest angle between the slider and the final direction of the path, after the push."
+    )
+    tracking: PositiveMetres = Field(
+        0.015, description="Largest mean distance of the slider from the reference during the whole push."
+    )
 
 
 class PushOutcome(NamedTuple):

@@ -38,14 +38,28 @@ class WeightsConfig(ConfigModel):
         complementarity: Penalty for inputs with which the contact neither sticks nor slides [s^2/m^2].
     """
 
-    position: NonNegative = Field(30000.0, description="Weight of the distance from the path [1/m^2].")
-    yaw: NonNegative = Field(10.0, description="Weight of the difference from its direction [1/rad^2].")
-    contact: NonNegative = Field(1.0, description="Weight of the pusher's distance from the middle [1/m^2].")
-    force: NonNegative = Field(10.0, description="Weight of deviations from the forces along the path [s^2/m^2].")
-    sliding: NonNegative = Field(10.0, description="Weight of sliding along the face [s^2/m^2].")
-    change: NonNegative = Field(10.0, description="Weight of a change of the force at the first step [s^2/m^2].")
-    final: NonNegative = Field(5.0, description="Factor of the weights of the last state.")
-    complementarity: Positive = Field(1000.0, description="Penalty of neither sticking nor sliding [s^2/m^2].")
+    position: NonNegative = Field(30000.0, description="Weight of the slider's distance from the path [1/m^2].")
+    yaw: NonNegative = Field(
+        10.0, description="Weight of the difference between the slider's yaw and the direction of the path [1/rad^2]."
+    )
+    contact: NonNegative = Field(
+        1.0, description="Weight of the pusher's distance from the middle of the face [1/m^2]."
+    )
+    force: NonNegative = Field(
+        10.0,
+        description="Weight of the tangential force, and of the difference between the normal force and the force "
+        "that moves the slider along the path [s^2/m^2].",
+    )
+    sliding: NonNegative = Field(10.0, description="Weight of the pusher's speed of sliding along the face [s^2/m^2].")
+    change: NonNegative = Field(
+        10.0,
+        description="Weight of the difference between the force in the first step and the previous force [s^2/m^2].",
+    )
+    final: NonNegative = Field(5.0, description="Factor of the weights for the last state.")
+    complementarity: Positive = Field(
+        1000.0,
+        description="Weight of forces and velocities with which the contact neither sticks nor slides [s^2/m^2].",
+    )
 
 
 class ProgramConfig(ConfigModel):
@@ -65,13 +79,17 @@ class ProgramConfig(ConfigModel):
 
     steps: Annotated[int, Field(ge=2, le=200)] = Field(20, description="Number of steps of the horizon.")
     step_s: Seconds = Field(0.08, description="Duration of a step.")
-    max_speed: Annotated[Positive, Unit("m/s")] = Field(0.15, description="Largest speed of the pusher.")
-    weights: WeightsConfig = Field(WeightsConfig(), description="The cost.")
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(
+        0.15, description="Largest speed of the pusher normal to the face, and largest speed of sliding along the face."
+    )
+    weights: WeightsConfig = Field(WeightsConfig(), description="Weights of the cost.")
     solvers: Annotated[ListOf[Literal["fatrop", "ipopt"]], Field(min_length=1)] = Field(
         ("fatrop", "ipopt"), description="Solvers, tried in this order until one converges."
     )
-    max_iterations: Annotated[int, Field(ge=1)] = Field(40, description="Largest number of iterations.")
-    tolerance: Positive = Field(1e-3, description="Optimality at which it stops.")
+    max_iterations: Annotated[int, Field(ge=1)] = Field(
+        40, description="Number of iterations after which a solver gives up."
+    )
+    tolerance: Positive = Field(1e-3, description="Optimality error below which a solver stops.")
 
 
 class Solved(NamedTuple):

@@ -46,15 +46,24 @@ class PushSamplingConfig(SamplingConfig):
             path within the horizon.
     """
 
-    horizon: Seconds = Field(1.2, description="Horizon.")
-    knots: Annotated[int, Field(ge=2)] = Field(3, description="Knots of a plan, between which velocities are linear.")
+    horizon: Seconds = Field(1.2, description="Duration of the simulated plans.")
+    knots: Annotated[int, Field(ge=2)] = Field(
+        3, description="Number of knots of a plan; velocities are linear between two knots."
+    )
     sampler: dict[Text, Any] = Field(
         {"type": "predictive", "candidates": 16, "noise": 0.2},
-        description="Its `type`, which is predictive, cem, mppi, or module:Class of your own, and its options.",
+        description="Sampler: its `type` (`predictive`, `cem`, `mppi`, or `module:Class` of your own) and the "
+        "options of this type.",
     )
-    forward: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Largest speed of the pusher towards the face.")
-    across: Annotated[Positive, Unit("m/s")] = Field(0.12, description="Largest speed along the face.")
-    yaw: NonNegative = Field(300.0, description="Weight of the difference from the path's direction [1/rad^2].")
+    forward: Annotated[Positive, Unit("m/s")] = Field(
+        0.1,
+        description="Largest speed of the pusher towards the face. The largest speed away from the face is a fifth "
+        "of this speed.",
+    )
+    across: Annotated[Positive, Unit("m/s")] = Field(0.12, description="Largest speed of the pusher along the face.")
+    yaw: NonNegative = Field(
+        300.0, description="Weight of the difference between the slider's yaw and the direction of the path [1/rad^2]."
+    )
 
 
 RETREAT = 0.2

@@ -40,14 +40,17 @@ class Rollouts(Protocol):
 class SamplingConfig(ConfigModel):
     """Horizon, knots and sampler of a controller that simulates candidate plans."""
 
-    horizon: Seconds = Field(0.5, description="Horizon.")
+    horizon: Seconds = Field(0.5, description="Duration of the simulated plans.")
     knots: Annotated[int, Field(ge=2)] = Field(
-        2, description="Knots of a plan, between which commands are linear; more need more candidates."
+        2,
+        description="Number of knots of a plan; commands are linear between two knots. More knots need more "
+        "candidates.",
     )
-    seed: int = Field(0, description="Seed of the candidates.")
+    seed: int = Field(0, description="Seed of the random candidates.")
     sampler: dict[Text, Any] = Field(
         {"type": "predictive"},
-        description="Its `type`, which is predictive, cem, mppi, or module:Class of your own, and its options.",
+        description="Sampler: its `type` (`predictive`, `cem`, `mppi`, or `module:Class` of your own) and the "
+        "options of this type.",
     )
 
 

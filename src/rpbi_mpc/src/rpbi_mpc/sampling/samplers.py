@@ -19,10 +19,16 @@ from custom_ros_tools.schema import ConfigModel, KeyedError
 class SamplerConfig(ConfigModel):
     """Options that all samplers have in common."""
 
-    candidates: Annotated[int, Field(ge=2)] = Field(16, description="Plans that are simulated in each iteration.")
-    iterations: Annotated[int, Field(ge=1)] = Field(1, description="Number of improvements of the plan in a cycle.")
+    candidates: Annotated[int, Field(ge=2)] = Field(
+        16, description="Number of plans that are simulated in each iteration."
+    )
+    iterations: Annotated[int, Field(ge=1)] = Field(
+        1, description="Number of iterations that improve the plan in a cycle."
+    )
     noise: Annotated[float, Field(gt=0, le=1)] = Field(
-        0.1, description="Standard deviation of each knot, as a share of the range of its number."
+        0.1,
+        description="Standard deviation of the random values at each knot, as a fraction of the range between the "
+        "limits.",
     )
 
 
@@ -75,9 +81,16 @@ class PredictiveSampler(Sampler):
 class CemConfig(SamplerConfig):
     """Options of the cross-entropy method."""
 
-    iterations: Annotated[int, Field(ge=1)] = Field(3, description="Number of improvements of the plan in a cycle.")
-    elites: Annotated[int, Field(ge=1)] = Field(4, description="Best candidates, whose mean is the plan.")
-    least_noise: Annotated[float, Field(gt=0, le=1)] = Field(0.01, description="Least standard deviation.")
+    iterations: Annotated[int, Field(ge=1)] = Field(
+        3, description="Number of iterations that improve the plan in a cycle."
+    )
+    elites: Annotated[int, Field(ge=1)] = Field(
+        4, description="Number of best candidates, whose mean becomes the plan."
+    )
+    least_noise: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.01,
+        description="Least standard deviation of the random values, as a fraction of the range between the limits.",
+    )
 
     @model_validator(mode="after")
     def _has_enough_candidates(self) -> CemConfig:
@@ -113,7 +126,9 @@ class MppiConfig(SamplerConfig):
     """Options of model predictive path integral control (MPPI)."""
 
     temperature: Annotated[float, Field(gt=0)] = Field(
-        0.1, description="Difference in cost for a weight of 1/e, as a share of the spread of all costs."
+        0.1,
+        description="Difference in cost that reduces a candidate's weight to 1/e, as a fraction of the spread of all "
+        "costs.",
     )
 
 

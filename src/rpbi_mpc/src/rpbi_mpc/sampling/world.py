@@ -19,11 +19,11 @@ from rpbi_mpc.controller import Plant, Sensed
 class InputConfig(ConfigModel):
     """World input that the controller commands, and limits of the commanded numbers."""
 
-    input: str = Field(description="NAME/INPUT, such as kuka_lwr/target.")
-    names: ListOf[str] = Field(description="Joints, or fields of its value, that are commanded.")
-    lower: ListOf[float] = Field(description="Lower limit of each number.")
-    upper: ListOf[float] = Field(description="Upper limit of each number.")
-    start: ListOf[float] = Field((), description="Command at the start; by default the middle.")
+    input: str = Field(description="Input of the world: NAME/INPUT, such as kuka_lwr/target.")
+    names: ListOf[str] = Field(description="Joints, or fields of the input's value, that are commanded.")
+    lower: ListOf[float] = Field(description="Lower limit of each commanded number.")
+    upper: ListOf[float] = Field(description="Upper limit of each commanded number.")
+    start: ListOf[float] = Field((), description="Initial command. By default, the middle between the limits.")
 
     @model_validator(mode="after")
     def _has_limits_of_all(self) -> InputConfig:

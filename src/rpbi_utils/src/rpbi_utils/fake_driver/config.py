@@ -36,18 +36,21 @@ NoNegativeTime = Annotated[NonNegative, Unit("s")]
 class DriverJointLimits(ConfigModel):
     """Limits that a robot's controller checks for one joint."""
 
-    lower: Angle = Field(description="Lowest position.")
-    upper: Angle = Field(description="Highest position.")
-    velocity: Annotated[Positive, Unit("rad/s or m/s")] = Field(description="Highest commanded speed.")
+    lower: Angle = Field(description="Lower position limit.")
+    upper: Angle = Field(description="Upper position limit.")
+    velocity: Annotated[Positive, Unit("rad/s or m/s")] = Field(description="Largest commanded speed.")
     acceleration: Annotated[Positive, Unit("rad/s^2 or m/s^2")] = Field(
-        description="Largest commanded acceleration; also the deceleration of a reflex stop."
+        description="Largest commanded acceleration, and deceleration of a reflex stop."
     )
-    jerk: Annotated[Positive, Unit("rad/s^3 or m/s^3")] = Field(description="Highest commanded jerk.")
-    torque: Annotated[Positive, Unit("N m or N")] = Field(description="Effort of its motor that triggers a reflex.")
+    jerk: Annotated[Positive, Unit("rad/s^3 or m/s^3")] = Field(description="Largest commanded jerk.")
+    torque: Annotated[Positive, Unit("N m or N")] = Field(description="Motor effort that triggers a reflex.")
     step: PositiveAngle | None = optional(
-        "Largest distance between two commands; by default, that of three times `velocity` in one cycle."
+        "Largest distance between two commands. By default, the distance that the joint covers in one cycle at three "
+        "times `velocity`."
     )
-    following_error: PositiveAngle = Field(0.2, description="Largest distance of the joint from its set point.")
+    following_error: PositiveAngle = Field(
+        0.2, description="Largest distance of the measured position from the commanded position."
+    )
 
     @model_validator(mode="after")
     def _lower_is_below_upper(self) -> DriverJointLimits:
@@ -59,35 +62,45 @@ class DriverJointLimits(ConfigModel):
 class NoiseConfig(ConfigModel):
     """Noise and delay that are added to measured joint states."""
 
-    position: Annotated[NonNegative, Unit("rad or m")] = Field(0.0, description="Standard deviation of positions.")
-    velocity: Annotated[NonNegative, Unit("rad/s or m/s")] = Field(0.0, description="That of velocities.")
-    effort: Annotated[NonNegative, Unit("N m or N")] = Field(0.0, description="That of efforts.")
-    delay_s: NoNegativeTime = Field(0.0, description="Age of states when they are published.")
+    position: Annotated[NonNegative, Unit("rad or m")] = Field(
+        0.0, description="Standard deviation of the noise of positions."
+    )
+    velocity: Annotated[NonNegative, Unit("rad/s or m/s")] = Field(
+        0.0, description="Standard deviation of the noise of velocities."
+    )
+    effort: Annotated[NonNegative, Unit("N m or N")] = Field(
+        0.0, description="Standard deviation of the noise of efforts."
+    )
+    delay_s: NoNegativeTime = Field(0.0, description="Age of joint states when they are published.")
     seed: Count = Field(0, description="Seed of the noise.")
 
 
 class FakeDriverConfig(ConfigModel):
     """Emulated robot driver: the robot, its joint limits, timing, delays and noise, and names and units of joints."""
 
-    robot: Name = Field(description="The robot in the simulator of the same namespace, `rpbi/NAME`.")
-    limits: Text = Field(description=f"Whose limits it has: {', '.join(ROBOTS)}, or a YAML file of such limits.")
-    joint_limits: dict[Text, dict[Text, Any]] = Field({}, description="Limits that differ from those, by joint.")
+    robot: Name = Field(description="Name of the simulated robot, NAME in `rpbi/NAME`, in the node's namespace.")
+    limits: Text = Field(description=f"Joint limits: those of {', '.join(ROBOTS)}, or a YAML file with limits.")
+    joint_limits: dict[Text, dict[Text, Any]] = Field(
+        {}, description="Limits that replace those of `limits`, keyed by joint name and by the name of the limit."
+    )
     driver: RemapConfig = Field(
-        RemapConfig(), description="Names, units and order of its joints, as in the nodes that remap to it."
+        RemapConfig(),
+        description="Names, units and order of joints at the emulated driver, as in the nodes that remap joint "
+        "states for a driver.",
     )
-    command_hz: Hz = Field(100.0, description="Rate of the controller; it expects one command per cycle.")
+    command_hz: Hz = Field(100.0, description="Rate of the emulated controller, which expects one command per cycle.")
     rate_tolerance: Annotated[Fraction, Field(gt=0)] = Field(
-        0.3, description="Share by which the rate of commands over one second may differ."
+        0.3, description="Largest deviation of the commands' rate over one second, as a fraction of `command_hz`."
     )
-    timeout_s: Seconds = Field(0.1, description="Time without a command during motion after which it stops.")
+    timeout_s: Seconds = Field(0.1, description="Time without a command after which a moving robot stops.")
     start_tolerance: PositiveAngle = Field(
-        0.02, description="Largest distance of the first command from the present position."
+        0.02, description="Largest distance of the first command from the position that the robot holds."
     )
     torque_time_s: NoNegativeTime = Field(
-        0.05, description="Longest time for which a motor may exert its largest effort."
+        0.05, description="Time at a motor's effort limit after which a reflex is triggered."
     )
-    command_delay_s: NoNegativeTime = Field(0.0, description="Delay of commands on their way to the motors.")
-    noise: NoiseConfig = Field(NoiseConfig(), description="Noise and delay of the published states.")
+    command_delay_s: NoNegativeTime = Field(0.0, description="Delay of commands until they reach the motors.")
+    noise: NoiseConfig = Field(NoiseConfig(), description="Noise and delay of the published joint states.")
 
     def load_limits(self) -> dict[str, DriverJointLimits]:
         """Returns the joint limits, keyed by joint name in the simulator. The keys have the driver's joint order.
@@ -123,7 +136,9 @@ class FakeDriverConfig(ConfigModel):
 class RobotLimits(ConfigModel):
     """Content of a YAML file with the limits of a robot's joints."""
 
-    joints: dict[Text, DriverJointLimits] = Field(description="Limits of each joint, by its name in the simulator.")
+    joints: dict[Text, DriverJointLimits] = Field(
+        description="Limits of the joints, keyed by joint name in the simulator."
+    )
 
     @model_validator(mode="after")
     def _has_joints(self) -> RobotLimits:

@@ -48,22 +48,28 @@ class WaypointError(ValueError):
 class InterpolationParameters(ConfigModel):
     """Private parameters of `interpolation_node.py`."""
 
-    traj_config: Text = Field(description="YAML file of the motion: a path, or `{package}/path`.")
+    traj_config: Text = Field(description="YAML file of the motion: a path or `{package}/path`.")
     consuming_freq: Annotated[float, Field(gt=0, le=MAX_CONSUMING_HZ)] = Field(
-        100.0, description="Largest rate of targets [Hz of ROS time]."
+        100.0, description="Largest rate of targets [Hz], in ROS time."
     )
-    namespace: str = Field("", description="Prefix of the target's TF frame.")
+    namespace: str = Field("", description="Prefix of the TF frame that is the target.")
 
 
 class TranslationConfig(ConfigModel):
     """Position of the target frame. Each coordinate is constant or taken from a row of the waypoint matrix."""
 
-    translation_x: Metres | None = optional("Constant x; without it, x is planned.")
-    translation_x_index: Count | None = optional("Row of x, not counting the time, if it is planned.")
-    translation_y: Metres | None = optional("Constant y; without it, y is planned.")
-    translation_y_index: Count | None = optional("Row of y.")
-    translation_z: Metres | None = optional("Constant z; without it, z is planned.")
-    translation_z_index: Count | None = optional("Row of z.")
+    translation_x: Metres | None = optional("Constant x. By default, x is planned from `translation_x_index`.")
+    translation_x_index: Count | None = optional(
+        "Index of the waypoint row with x, without counting the row of times; required if x is planned."
+    )
+    translation_y: Metres | None = optional("Constant y. By default, y is planned from `translation_y_index`.")
+    translation_y_index: Count | None = optional(
+        "Index of the waypoint row with y, without counting the row of times; required if y is planned."
+    )
+    translation_z: Metres | None = optional("Constant z. By default, z is planned from `translation_z_index`.")
+    translation_z_index: Count | None = optional(
+        "Index of the waypoint row with z, without counting the row of times; required if z is planned."
+    )
 
     def axis(self, name: str) -> tuple[float | None, int | None]:
         """Returns the constant coordinate [m] and the row index of axis `x`, `y` or `z`; None for a missing value."""
@@ -75,16 +81,16 @@ class RotationConfig(ConfigModel):
 
     rotation_repr: Annotated[Literal["none", "theta", "euler", "quat", "axis_angle"], _LowerCase] = Field(
         "none",
-        description="`none`: constant; `theta`: angle about `rotation_vec` [rad]; `euler`: intrinsic rotations about "
-        "z, y, x [rad]; `quat`: x, y, z, w; `axis_angle`: rotation vector [rad].",
+        description="Representation of the orientation. `none`: constant; `theta`: angle about `rotation_vec` [rad]; "
+        "`euler`: intrinsic rotations about z, y, x [rad]; `quat`: x, y, z, w; `axis_angle`: rotation vector [rad].",
     )
     rotation_vec: Direction | None = optional("Axis of the rotation, for `none` and `theta`.")
-    rotation_angle: Degrees | None = optional("Angle about that axis, for `none`.")
+    rotation_angle: Degrees | None = optional("Constant angle about `rotation_vec`, for `none`.")
     rotation_vec_index: ListOf[Count] | None = optional(
-        "Rows: `[i]` for `theta`; first row and the one after the last for the others."
+        "Indices of the waypoint rows with the orientation: `[row]` for `theta`, otherwise `[first row, last row + 1]`."
     )
     shortest_path: Switch = Field(
-        False, description="Whether `theta` and `euler` turn by the shorter rotation, not by their full angles."
+        False, description="Whether `theta` and `euler` follow the shortest rotation, otherwise the full angles."
     )
 
     @property
@@ -145,10 +151,14 @@ class RotationConfig(ConfigModel):
 class MotionDimensions(ConfigModel):
     """Meaning of the rows of the waypoint matrix: the pose of a frame, or the positions of joints."""
 
-    number: Annotated[Count, Field(ge=1)] = Field(description="Number n of planned rows, without the time.")
-    trans: TranslationConfig | None = optional("Position of a frame.")
+    number: Annotated[Count, Field(ge=1)] = Field(
+        description="Number n of planned waypoint rows, without the row of times."
+    )
+    trans: TranslationConfig | None = optional("Position of a frame. Either this key or `joint_names` is required.")
     rotation: RotationConfig = Field(RotationConfig(), description="Orientation of a frame.")
-    joint_names: ListOf[Text] | None = optional("Names of n joints instead of a frame, in the order of the rows.")
+    joint_names: ListOf[Text] | None = optional(
+        "Names of n joints, in the order of the rows, if joints move instead of a frame."
+    )
 
     @model_validator(mode="after")
     def _rows_exist(self) -> MotionDimensions:
@@ -197,41 +207,45 @@ class InterpolationConfig(ConfigModel):
     """Settings of the interpolation between waypoints: curve, sample time, limits, and treatment of new waypoints."""
 
     use_interpolation: Switch = Field(
-        True, description="Whether to interpolate; otherwise waypoints are published unchanged, at their times."
+        True,
+        description="Whether targets are interpolated; otherwise the waypoints are published unchanged, at their "
+        "times.",
     )
-    inter_dt: Seconds = Field(0.01, description="Time between two samples.")
-    nochange_window_length: Count = Field(0, description="Number of coming samples that new waypoints do not change.")
-    method: Literal["linear", "cubic", "quintic"] = Field("cubic", description="Curve between two waypoints.")
+    inter_dt: Seconds = Field(0.01, description="Time between two interpolated samples.")
+    nochange_window_length: Count = Field(0, description="Number of next samples that new waypoints do not change.")
+    method: Literal["linear", "cubic", "quintic"] = Field(
+        "cubic", description="Shape of the curve between two waypoints."
+    )
     time_origin: Literal["arrival", "ros_time"] = Field(
-        "arrival", description="Meaning of time 0 of the waypoints: when they arrive, or 0 of ROS time."
+        "arrival", description="Time to which the waypoints' times refer: their arrival, or 0 of ROS time."
     )
-    limits: MotionLimitsConfig = Field(MotionLimitsConfig(), description="Largest speeds and accelerations.")
-    hold: Switch = Field(False, description="Whether the last target is repeated when the waypoints end.")
+    limits: MotionLimitsConfig = Field(MotionLimitsConfig(), description="Limits of speeds and accelerations.")
+    hold: Switch = Field(False, description="Whether the last target is published repeatedly after the last waypoint.")
     accept_repetitions: Switch = Field(
-        False, description="Whether a message equal to the one before is a new motion, rather than a repetition."
+        False, description="Whether a message that equals the previous one is a new motion, otherwise a repetition."
     )
 
 
 class PublisherConfig(ConfigModel):
     """TF frames or joint topic to which the interpolated targets are published."""
 
-    header_frame_id: FrameId | None = optional("Parent frame of the target.")
-    msg_child_frame_id: FrameId | None = optional("TF frame of the target.")
-    joint_topic: TopicName = Field("joint_states/target", description="Topic of targets of joints.")
+    header_frame_id: FrameId | None = optional("Parent frame of the target; required if a frame moves.")
+    msg_child_frame_id: FrameId | None = optional("TF frame that is the target; required if a frame moves.")
+    joint_topic: TopicName = Field("joint_states/target", description="Topic of the joint targets, if joints move.")
 
 
 class CommunicationConfig(ConfigModel):
     """Topics and TF frames of `interpolation_node.py`."""
 
-    publisher: PublisherConfig = Field(PublisherConfig(), description="Destination of the targets.")
+    publisher: PublisherConfig = Field(PublisherConfig(), description="Topic or TF frames of the targets.")
 
 
 class WaypointMotionConfig(ConfigModel):
     """A motion through waypoints: meaning of the waypoints, interpolation, and destination of the targets."""
 
-    motion_dimensions: MotionDimensions = Field(description="Meaning of the rows of the waypoints.")
+    motion_dimensions: MotionDimensions = Field(description="Meaning of the waypoint rows.")
     interpolation: InterpolationConfig = Field(InterpolationConfig(), description="Interpolation between waypoints.")
-    communication: CommunicationConfig = Field(CommunicationConfig(), description="Topics and frames.")
+    communication: CommunicationConfig = Field(CommunicationConfig(), description="Topics and TF frames.")
 
     @model_validator(mode="after")
     def _has_frames(self) -> WaypointMotionConfig:

@@ -36,16 +36,23 @@ class MotionLimitsConfig(ConfigModel):
     """Limits of the speed and acceleration of a motion through waypoints."""
 
     velocity: Annotated[Each, Unit("m/s, rad/s")] | None = optional(
-        "Largest speed of each row that is interpolated as a number: one for all, or a list. For joints, the largest "
-        "speeds in the parameter `robot_description`, if it has them."
+        "Largest speed of rows that are interpolated as numbers: one for all rows, or a list. By default, the speed "
+        "limits of joints in the parameter `robot_description`, if it has any."
     )
-    acceleration: Annotated[Each, Unit("m/s^2, rad/s^2")] | None = optional("Largest acceleration, likewise.")
+    acceleration: Annotated[Each, Unit("m/s^2, rad/s^2")] | None = optional(
+        "Largest acceleration of rows that are interpolated as numbers: one for all rows, or a list. By default, "
+        "accelerations are not limited."
+    )
     angular_velocity: Annotated[Positive, Unit("rad/s")] | None = optional(
-        "Largest angular velocity of an interpolated orientation."
+        "Largest angular velocity of an orientation that is interpolated as a rotation. By default, not limited."
     )
-    angular_acceleration: Annotated[Positive, Unit("rad/s^2")] | None = optional("Largest angular acceleration.")
+    angular_acceleration: Annotated[Positive, Unit("rad/s^2")] | None = optional(
+        "Largest angular acceleration of an orientation that is interpolated as a rotation. By default, not limited."
+    )
     exceeded: Literal["slow", "refuse"] = Field(
-        "slow", description="Whether a motion that exceeds a limit is slowed down as a whole, or refused."
+        "slow",
+        description="Treatment of a motion that exceeds a limit: `slow` slows down the whole motion, `refuse` "
+        "refuses it.",
     )
 
     def check_rows(self, count: int, method: str) -> None:

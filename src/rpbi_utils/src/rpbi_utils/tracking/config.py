@@ -32,16 +32,26 @@ FAMILY_SIZE = 587
 class TrackedObjectConfig(ConfigModel):
     """An object that is tracked either by Vicon or by AprilTags."""
 
-    name: FrameId = Field(description="TF frame of the object that is broadcast.")
-    vicon: Text | None = optional("Subject and segment, as `SUBJECT/SEGMENT`; the topic is `vicon/SUBJECT/SEGMENT`.")
-    april_tag: Count | ListOf[Count] | None = optional("Id of a tag, or a list: those of a bundle.")
-    topics: ListOf[TopicName] = Field(
-        ("tag_detections",), description="Topics of the detectors that see its tags, one for each camera."
+    name: FrameId = Field(description="TF frame that is broadcast for the object.")
+    vicon: Text | None = optional(
+        "Vicon subject and segment of the object, as `SUBJECT/SEGMENT`; poses come from the topic "
+        "`vicon/SUBJECT/SEGMENT`. Either this key or `april_tag` is required."
     )
-    frame_id: FrameId | None = optional("TF frame of its poses; without it, the frame in the messages.")
+    april_tag: Count | ListOf[Count] | None = optional(
+        "Id of the object's tag, or a list with the ids of a bundle of tags. Either this key or `vicon` is required."
+    )
+    topics: ListOf[TopicName] = Field(
+        ("tag_detections",), description="Topics of the detectors that see the object's tags, one for each camera."
+    )
+    frame_id: FrameId | None = optional("TF frame in which poses are received. By default, the frame in the messages.")
     unit: Literal["m", "mm"] = Field("m", description="Unit of the received positions.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Position of the object's frame in the tracked frame.")
-    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation, x, y, z, w.")
+    position: Position = Field(
+        (0.0, 0.0, 0.0), description="Position of the object's frame in the frame of the segment, tag or bundle."
+    )
+    orientation: Quat = Field(
+        (0.0, 0.0, 0.0, 1.0),
+        description="Orientation of the object's frame in the frame of the segment, tag or bundle, x, y, z, w.",
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> TrackedObjectConfig:
@@ -71,11 +81,11 @@ class TrackingNodeConfig(ConfigModel):
 
     frame_id: FrameId = Field("rpbi/world", description="TF frame in which poses are smoothed and broadcast.")
     timeout_s: Seconds = Field(
-        0.5, description="Time without a pose after which an object is lost: nothing is broadcast."
+        0.5, description="Time without a pose after which the object counts as lost, and is no longer broadcast."
     )
     smoothing: SmoothingConfig = Field(SmoothingConfig(), description="Smoothing of poses.")
     outliers: OutlierConfig = Field(OutlierConfig(), description="Rejection of outliers.")
-    objects: ListOf[TrackedObjectConfig] = Field(description="The objects.")
+    objects: ListOf[TrackedObjectConfig] = Field(description="Objects that are tracked.")
 
     @model_validator(mode="after")
     def _names_differ(self) -> TrackingNodeConfig:
@@ -91,16 +101,16 @@ class TrackingNodeConfig(ConfigModel):
 class StandaloneTag(ConfigModel):
     """Id, size and TF frame of a tag that `apriltag_node.py` reports."""
 
-    id: Count = Field(description="Its number in the family.")
-    size: PositiveMetres = Field(description="Side of its black square.")
-    name: FrameId | None = optional("Its TF frame; without it, `tag_ID`.")
+    id: Count = Field(description="Number of the tag in its tag family.")
+    size: PositiveMetres = Field(description="Side of the tag's black square.")
+    name: FrameId | None = optional("TF frame of the tag. By default, `tag_ID`.")
 
 
 class AprilTagNodeConfig(ConfigModel):
     """Tags of the family tag36h11 that `apriltag_node.py` reports."""
 
-    standalone_tags: ListOf[StandaloneTag] = Field(description="The tags.")
-    publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")
+    standalone_tags: ListOf[StandaloneTag] = Field(description="Tags that are reported.")
+    publish_tf: Switch = Field(True, description="Whether the poses of tags are also published on TF.")
 
     @model_validator(mode="after")
     def _ids_differ(self) -> AprilTagNodeConfig:

@@ -25,14 +25,16 @@ from robot_model.geometry import (
 class SmoothingConfig(ConfigModel):
     """Parameters of a low-pass filter for poses. Its cut-off frequency grows with speed, to reduce the delay."""
 
-    min_cutoff_hz: HzOrOff = Field(2.0, description="Cut-off frequency at rest; 0 leaves poses as they are.")
+    min_cutoff_hz: HzOrOff = Field(
+        2.0, description="Cut-off frequency of the pose filter at rest; 0 disables smoothing."
+    )
     per_speed: Annotated[NonNegative, Unit("Hz/(m/s)")] = Field(
-        20.0, description="Increase of the cut-off frequency per m/s."
+        20.0, description="Increase of the cut-off frequency with the object's speed."
     )
     per_angular_speed: Annotated[NonNegative, Unit("Hz/(rad/s)")] = Field(
-        5.0, description="Increase of the cut-off frequency per rad/s."
+        5.0, description="Increase of the cut-off frequency with the object's angular speed."
     )
-    speed_cutoff_hz: Hz = Field(2.0, description="Cut-off frequency of the low-pass of the speeds.")
+    speed_cutoff_hz: Hz = Field(2.0, description="Cut-off frequency of the low-pass filter for the speeds.")
 
 
 class OneEuroPose:
@@ -86,16 +88,20 @@ class OutlierConfig(ConfigModel):
     After several consecutive outliers that are consistent with each other, the new poses are accepted.
     """
 
-    max_speed: Annotated[Positive, Unit("m/s")] = Field(5.0, description="Fastest motion of the object.")
-    max_angular_speed: Annotated[Positive, Unit("rad/s")] = Field(20.0, description="Its fastest rotation.")
-    tolerance_m: NonNegativeMetres = Field(0.02, description="Distance added to that at the largest speed, for noise.")
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(5.0, description="Largest speed of the object.")
+    max_angular_speed: Annotated[Positive, Unit("rad/s")] = Field(
+        20.0, description="Largest angular speed of the object."
+    )
+    tolerance_m: NonNegativeMetres = Field(
+        0.02, description="Distance added to the motion at `max_speed`, to allow for noise."
+    )
     tolerance_rad: Annotated[NonNegative, Unit("rad")] = Field(
-        0.2, description="Angle added to that at the largest angular speed."
+        0.2, description="Angle added to the rotation at `max_angular_speed`, to allow for noise."
     )
     in_a_row: Annotated[Count, Field(ge=1)] = Field(
         5,
-        description="Number of consecutive poses, consistent with each other, after which they are accepted; 1 drops "
-        "none.",
+        description="Number of consecutive outliers, consistent with each other, after which poses are accepted "
+        "again; 1 accepts all poses.",
     )
 
 

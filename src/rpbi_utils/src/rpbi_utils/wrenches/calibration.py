@@ -36,11 +36,16 @@ class PayloadConfig(ConfigModel):
     """Mass and centre of mass of a payload, and the wrench that the sensor reports without a load."""
 
     mass: Annotated[float, Unit("kg")] = Field(
-        description="Mass; negative if the sensor reports the wrench that acts on it, not the one that it exerts."
+        description="Mass of the payload; negative if the sensor reports the wrench that acts on the sensor instead "
+        "of the wrench that the sensor exerts."
     )
-    centre: Position = Field(description="Centre of mass in the sensor's frame.")
-    force_offset: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="Force without any load.")
-    torque_offset: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Torque without any load.")
+    centre: Position = Field(description="Centre of mass of the payload in the sensor's frame.")
+    force_offset: Annotated[Vec3, Unit("N")] = Field(
+        (0.0, 0.0, 0.0), description="Force that the sensor reports without a load."
+    )
+    torque_offset: Annotated[Vec3, Unit("N m")] = Field(
+        (0.0, 0.0, 0.0), description="Torque that the sensor reports without a load."
+    )
 
     def weight(self, gravity: Vector) -> Array:
         """Returns the force and torque that the payload's weight adds to the sensor's reading [N, N m], shape (6,).
@@ -60,17 +65,31 @@ class PayloadConfig(ConfigModel):
 class CalibrationParameters(ConfigModel):
     """Private parameters of `calibrate_wrench_node.py`."""
 
-    max_samples: Annotated[Count, Field(ge=1)] = Field(100, description="Number of messages in a mean.")
-    sensor_frame: FrameId | None = optional("TF frame of the sensor; without it, the frame in the messages.")
+    max_samples: Annotated[Count, Field(ge=1)] = Field(
+        100, description="Number of messages over which a mean is computed."
+    )
+    sensor_frame: FrameId | None = optional("TF frame of the sensor. By default, the frame in the messages.")
     gravity_frame: FrameId = Field("rpbi/world", description="TF frame in which gravity points along -z.")
-    gravity: Annotated[Positive, Unit("m/s^2")] = Field(9.81, description="Gravity.")
-    max_force_spread: Newton = Field(1.0, description="Largest standard deviation of a force while the sensor rests.")
-    max_torque_spread: NewtonMetre = Field(0.1, description="Largest standard deviation of a torque while it rests.")
-    max_shift: PositiveMetres = Field(0.001, description="Largest motion of the sensor's frame while it rests.")
-    max_turn: Annotated[Positive, Unit("rad")] = Field(0.005, description="Largest rotation of it while it rests.")
-    max_residual_force: Newton = Field(1.0, description="Largest residual of the forces of an identified payload.")
-    max_residual_torque: NewtonMetre = Field(0.1, description="Largest residual of its torques.")
-    payload: PayloadConfig | None = optional("A known payload, such as an identified one.")
+    gravity: Annotated[Positive, Unit("m/s^2")] = Field(9.81, description="Gravitational acceleration.")
+    max_force_spread: Newton = Field(
+        1.0, description="Largest standard deviation of a force component of a sensor at rest."
+    )
+    max_torque_spread: NewtonMetre = Field(
+        0.1, description="Largest standard deviation of a torque component of a sensor at rest."
+    )
+    max_shift: PositiveMetres = Field(0.001, description="Largest displacement of the frame of a sensor at rest.")
+    max_turn: Annotated[Positive, Unit("rad")] = Field(
+        0.005, description="Largest rotation of the frame of a sensor at rest."
+    )
+    max_residual_force: Newton = Field(
+        1.0, description="Largest residual of the forces with which an identified payload is accepted."
+    )
+    max_residual_torque: NewtonMetre = Field(
+        0.1, description="Largest residual of the torques with which an identified payload is accepted."
+    )
+    payload: PayloadConfig | None = optional(
+        "Known payload, for instance one that was identified before. By default, no payload is known."
+    )
 
 
 class RestingMean:

@@ -24,14 +24,18 @@ class EnvironmentConfig(CheckConfig):
 
     margin_m: NonNegativeMetres = Field(0.02, description="Least distance between links and bodies [m].")
     timeout_s: Seconds = Field(
-        0.5, description="Largest age of a live body's pose; with an older one, no target is safe."
+        0.5, description="Largest age of a live body's pose. While a pose is older, no target is safe."
     )
     geometry: Geometry = Field("hulls", description=GEOMETRY)
     world: Text | None = Field(
-        None, description="Main YAML file of a world: its bodies as they are at the start; without it, live ones."
+        None,
+        description="Main YAML file of a world, whose bodies are obstacles at their start poses. By default, only "
+        "live bodies are obstacles.",
     )
     robot: Text | None = Field(
-        None, description="Name of the guarded robot in that world; by default its only body with these joints."
+        None,
+        description="Name of the guarded robot in `world`. By default, the only body in `world` that has the guarded "
+        "joints.",
     )
 
 

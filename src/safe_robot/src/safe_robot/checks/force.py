@@ -12,8 +12,8 @@ from safe_robot.motion import CommandedMotion
 class ForceConfig(CheckConfig):
     """Limits on the force and torque that a sensor measures."""
 
-    force_n: Positive = Field(50.0, description="Largest force [N].")
-    torque_nm: Positive = Field(10.0, description="Largest torque [N m].")
+    force_n: Positive = Field(50.0, description="Largest measured force [N].")
+    torque_nm: Positive = Field(10.0, description="Largest measured torque [N m].")
     timeout_s: Seconds = Field(0.1, description="Largest age of the measurement.")
 
 

@@ -21,9 +21,15 @@ SPARE_M = 1e-4
 class BoxConfig(ConfigModel):
     """A box, given in the frame of the robot's root link. An axis without limits may be left out."""
 
-    x: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest x [m].")
-    y: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest y [m].")
-    z: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest z [m].")
+    x: tuple[float | None, float | None] = Field(
+        (None, None), strict=False, description="Least and largest x of the link's origin [m]; null is no limit."
+    )
+    y: tuple[float | None, float | None] = Field(
+        (None, None), strict=False, description="Least and largest y of the link's origin [m]; null is no limit."
+    )
+    z: tuple[float | None, float | None] = Field(
+        (None, None), strict=False, description="Least and largest z of the link's origin [m]; null is no limit."
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> "BoxConfig":
@@ -37,7 +43,9 @@ class BoxConfig(ConfigModel):
 class LinkBoxConfig(CheckConfig):
     """Boxes that the origins of links must not leave."""
 
-    boxes: dict[str, BoxConfig] = Field({}, description="A box for each link whose origin is to stay in one.")
+    boxes: dict[str, BoxConfig] = Field(
+        {}, description="Boxes that the origins of links must not leave, keyed by link name."
+    )
 
 
 class Box(NamedTuple):

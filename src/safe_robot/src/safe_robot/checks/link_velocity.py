@@ -15,7 +15,7 @@ from safe_robot.motion import CommandedMotion
 class LinkVelocityConfig(CheckConfig):
     """Speed limits of links."""
 
-    links: dict[str, Positive] = Field({}, description="The largest speed of the origin of each of these links [m/s].")
+    links: dict[str, Positive] = Field({}, description="Largest speed of a link's origin [m/s], keyed by link name.")
 
 
 class LinkVelocity(Check):

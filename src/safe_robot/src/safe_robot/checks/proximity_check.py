@@ -14,8 +14,8 @@ from safe_robot.motion import Bound, CommandedMotion
 from .proximity import Proximity
 
 GEOMETRY = (
-    "Form of meshes: hulls, their convex hulls, which is fast; or exact, the meshes themselves where their hulls are"
-    " too near, which needs `./rpbi setup ik`."
+    "Form of meshes: `hulls` uses their convex hulls, which is fast. `exact` uses the meshes themselves where hulls are"
+    " too near, and requires `./rpbi setup ik`."
 )
 """Description of an option of type `Geometry`."""
 

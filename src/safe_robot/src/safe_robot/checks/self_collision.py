@@ -31,11 +31,14 @@ NEARLY_ALWAYS = 0.95
 class SelfCollisionConfig(CheckConfig):
     """Minimum distance between the links of the robot."""
 
-    margin_m: NonNegativeMetres = Field(0.01, description="Least distance between links [m].")
+    margin_m: NonNegativeMetres = Field(0.01, description="Least distance between two links [m].")
     geometry: Geometry = Field("hulls", description=GEOMETRY)
-    srdf: Text | None = Field(None, description="An SRDF file; pairs for which it disables collisions are left out.")
+    srdf: Text | None = Field(
+        None, description="SRDF file with pairs of links whose collisions are disabled; these pairs are not checked."
+    )
     pairs_file: Text | None = Field(
-        None, description="YAML file of the pairs; it is read if it exists, and written otherwise."
+        None,
+        description="YAML file of the checked pairs of links. An existing file is read, otherwise the file is written.",
     )
 
 

@@ -11,7 +11,7 @@ class StalenessConfig(CheckConfig):
     """Limit on the age of targets and on the time without a target."""
 
     timeout_s: Seconds = Field(
-        0.1, description="Largest age of a target, and longest time without one while the robot moves."
+        0.1, description="Largest age of a target, and longest time without a target while the robot moves."
     )
 
 

@@ -11,9 +11,11 @@ from safe_robot.motion import CommandedMotion
 class TrackingConfig(CheckConfig):
     """Limits on the difference between measured positions and commands."""
 
-    tolerance: Positive = Field(0.1, description="Largest distance between command and measured position [rad or m].")
+    tolerance: Positive = Field(0.1, description="Largest distance between commanded and measured position [rad or m].")
     lag_s: NonNegative = Field(
-        0.0, description="Lag of the robot behind commands [s]; speed times this lag is added to the tolerance."
+        0.0,
+        description="Delay with which the robot follows commands [s]. The distance that a joint covers in this time "
+        "is added to the tolerance.",
     )
     timeout_s: Seconds = Field(0.1, description="Largest age of measured positions.")
 

@@ -22,11 +22,12 @@ class ShapingConfig(ConfigModel):
     """Options for smoothing targets that the joints cannot follow within their limits."""
 
     time_s: Annotated[Seconds, Field(ge=1e-4)] = Field(
-        0.03, description="Time constant of the filter; smoothed commands lag behind by about twice as much."
+        0.03, description="Time constant of the filter. Smoothed commands lag behind targets by about twice this time."
     )
     reach: Annotated[Positive, Unit("rad or m")] = Field(
         0.25,
-        description="Largest distance of a target from the last command; one further away is a jump, and not smoothed.",
+        description="Largest distance of a target from the last command. A target that is further away is not "
+        "smoothed.",
     )
 
 

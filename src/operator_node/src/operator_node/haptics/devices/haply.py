@@ -37,13 +37,17 @@ KEYS = ("vector", "values")
 class HaplyConfig(HapticConfig):
     """Options of a Haply Inverse3."""
 
-    max_force_n: Positive = Field(8.0, description="Largest force that is sent to it [N].")
-    workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
-    url: Text = Field("ws://localhost:10001", description="Websocket of the service; port 10000 before 3.1.")
-    device_id: str = Field("", description="Id of the Inverse3, if there are several; empty selects the first one.")
+    max_force_n: Positive = Field(8.0, description="Largest force that is sent to the device [N].")
+    workspace_m: PositiveMetres = Field(0.1, description="Radius of the device's workspace.")
+    url: Text = Field(
+        "ws://localhost:10001", description="Websocket of Haply's service; versions before 3.1 use port 10000."
+    )
+    device_id: str = Field(
+        "", description="Id of the Inverse3 if several are connected. If empty, the first one is used."
+    )
     centre: Vec3 = Field((0.0, 0.0, 0.0), description="Middle of the workspace in the device's own axes [m].")
     force_key: Literal["auto", "vector", "values"] = Field(
-        "auto", description="Name of a force in the service's messages; auto tries which one has an effect."
+        "auto", description="Key of the force in messages to the service; `auto` finds out which key has an effect."
     )
 
 

@@ -16,15 +16,17 @@ SPREAD = 0.15
 class ScriptedConfig(HapticConfig):
     """Options of the scripted device, whose hand presses once and releases."""
 
-    max_force_n: Positive = Field(10.0, description="Largest force that is sent to it [N].")
-    workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
-    resolution_m: NonNegative = Field(0.0, description="It is exact [m].")
-    seed: Count = Field(0, description="Seed of the variation between presses.")
-    depth_m: Metres = Field(0.04, description="Depth of the press; it varies by some 15 % with the seed.")
-    hold_s: Positive = Field(
-        1.2, description="Time that the hand stays below [s]; it varies by some 15 % with the seed."
+    max_force_n: Positive = Field(10.0, description="Largest force that is sent to the device [N].")
+    workspace_m: PositiveMetres = Field(0.1, description="Radius of the device's workspace.")
+    resolution_m: NonNegative = Field(
+        0.0, description="Resolution of each measured axis [m]; 0 means exact measurements."
     )
-    wait_s: NonNegative = Field(0.5, description="Time that the hand stays above, before and after [s].")
+    seed: Count = Field(0, description="Seed of the random variation of the press.")
+    depth_m: Metres = Field(0.04, description="Depth of the press, which varies by about 15 % with the seed.")
+    hold_s: Positive = Field(
+        1.2, description="Time for which the hand stays pressed down [s], which varies by about 15 % with the seed."
+    )
+    wait_s: NonNegative = Field(0.5, description="Time for which the hand stays up before and after the press [s].")
 
 
 class ScriptedDevice(EmulatedDevice):

@@ -39,17 +39,22 @@ ENDED = "its ROS node was shut down"
 class TouchConfig(HapticConfig):
     """Options of a 3D Systems Touch and its ROS driver."""
 
-    max_force_n: Positive = Field(3.0, description="Largest force that is sent to it [N]; the Touch X has 7.9.")
-    workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
+    max_force_n: Positive = Field(
+        3.0, description="Largest force that is sent to the device [N]; a Touch X can exert 7.9 N."
+    )
+    workspace_m: PositiveMetres = Field(0.1, description="Radius of the device's workspace.")
     driver: Literal["omni", "pose", "touch_x"] = Field(
         "omni",
-        description="omni: omni_msgs, as in omni_common; pose: Pose and force_feedback of geomagic_touch_x_ros, as in"
-        " the release's human_interaction; touch_x: cmd_force, twist and TF, as in its nsl.",
+        description="ROS driver of the device. `omni`: omni_msgs, as in omni_common. `pose`: Pose and force_feedback "
+        "of geomagic_touch_x_ros, as in the release's human_interaction. `touch_x`: cmd_force, twist and TF, as in "
+        "the release's nsl.",
     )
-    name: Name = Field("phantom", description="Prefix of the topics.")
-    metres_per_unit: Positive = Field(0.001, description="Unit of lengths of `omni`: 0.001 for mm, 1 for m.")
-    handle_frame: Text = Field("touch_x_ee", description="TF frame of the handle, for `touch_x`.")
-    force_hz: Hz = Field(1000.0, description="Largest rate at which forces are published.")
+    name: Name = Field("phantom", description="Prefix of the driver's topics.")
+    metres_per_unit: Positive = Field(
+        0.001, description="Unit of lengths in messages of the driver `omni` [m]: 0.001 for mm, 1 for m."
+    )
+    handle_frame: Text = Field("touch_x_ee", description="TF frame of the handle, for the driver `touch_x`.")
+    force_hz: Hz = Field(1000.0, description="Largest rate of the force messages.")
     centre: Vec3 = Field((0.0, 0.0, 0.0), description="Middle of the workspace in the driver's own axes [m].")
 
 

@@ -27,13 +27,15 @@ SHOW_S = 0.02
 class VirtualConfig(HapticConfig):
     """Options of the virtual device, a window in which the mouse moves a handle."""
 
-    max_force_n: Positive = Field(10.0, description="Largest force that is sent to it [N].")
-    workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
-    resolution_m: NonNegative = Field(0.0, description="It is exact [m].")
+    max_force_n: Positive = Field(10.0, description="Largest force that is sent to the device [N].")
+    workspace_m: PositiveMetres = Field(0.1, description="Radius of the device's workspace.")
+    resolution_m: NonNegative = Field(
+        0.0, description="Resolution of each measured axis [m]; 0 means exact measurements."
+    )
     returns: Switch = Field(
         False,
-        description="Whether the handle returns to the middle when it is released, for control by speeds rather than "
-        "positions.",
+        description="Whether the handle returns to the middle when it is released, so that it can command velocities "
+        "rather than positions.",
     )
 
 

@@ -49,9 +49,14 @@ Preset = Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium
 class LeRobotConfig(ConfigModel):
     """Options of LeRobot data sets."""
 
-    preset: Preset = Field("veryfast", description="Speed of the encoder of videos.")
-    crf: int = Field(23, ge=0, le=51, description="Quantisation of videos; less is a better picture.")
-    robot_type: str = Field("", description="Name of the robot, for readers.")
+    preset: Preset = Field("veryfast", description="Speed preset of the video encoder.")
+    crf: int = Field(
+        23,
+        ge=0,
+        le=51,
+        description="Constant rate factor of the video encoder; smaller values give better pictures and larger files.",
+    )
+    robot_type: str = Field("", description="Name of the robot in the data set.")
 
 
 class LeRobot(DatasetFormat):

@@ -32,7 +32,7 @@ class McapConfig(ConfigModel):
     """Options of the format `mcap`."""
 
     distribution: Literal["humble", "jazzy", "kilted"] = Field(
-        "jazzy", description="Distribution of ROS 2 whose messages are used."
+        "jazzy", description="ROS 2 distribution whose message definitions are used."
     )
 
 

@@ -44,10 +44,10 @@ MAX_SCALING_ERROR = 1e-6
 class RobomimicConfig(ConfigModel):
     """Options of robomimic data sets."""
 
-    image_height: int = Field(84, ge=1, description="Rows of pixels of images, which are scaled.")
-    image_width: int = Field(84, ge=1, description="Columns of pixels.")
-    success: str = Field(SUCCESS, description="Label of episodes whose last row has the reward 1.")
-    valid: float = Field(0.1, ge=0.0, lt=1.0, description="Share of episodes in the filter `valid`.")
+    image_height: int = Field(84, ge=1, description="Height to which images are scaled [px].")
+    image_width: int = Field(84, ge=1, description="Width to which images are scaled [px].")
+    success: str = Field(SUCCESS, description="Label of successful episodes; their last row has the reward 1.")
+    valid: float = Field(0.1, ge=0.0, lt=1.0, description="Fraction of the episodes that belong to the filter `valid`.")
 
 
 class Robomimic(DatasetFormat):

@@ -33,12 +33,23 @@ class EstimatorConfig(ConfigModel):
         jump_rad: Difference in yaw beyond which the measurement replaces the estimate [rad].
     """
 
-    position: Share = Field(0.4, description="Share of a difference in position that is corrected in a cycle.")
-    yaw: Share = Field(0.4, description="Share of a difference in yaw that is corrected in a cycle.")
-    jump: Annotated[float, Field(gt=0.0)] = Field(
-        0.012, description="Distance beyond which a measurement replaces the estimate."
+    position: Share = Field(
+        0.4,
+        description="Fraction of the difference between measured and predicted position that is corrected in a cycle.",
     )
-    jump_rad: Annotated[float, Field(gt=0.0)] = Field(0.15, description="The same for yaw.")
+    yaw: Share = Field(
+        0.4, description="Fraction of the difference between measured and predicted yaw that is corrected in a cycle."
+    )
+    jump: Annotated[float, Field(gt=0.0)] = Field(
+        0.012,
+        description="Distance between measured and predicted position above which the measurement replaces the "
+        "estimate [m].",
+    )
+    jump_rad: Annotated[float, Field(gt=0.0)] = Field(
+        0.15,
+        description="Difference between measured and predicted yaw above which the measurement replaces the estimate "
+        "[rad].",
+    )
 
 
 class SceneEstimator:

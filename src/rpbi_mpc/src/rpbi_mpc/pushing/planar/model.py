@@ -48,13 +48,17 @@ class SliderConfig(ConfigModel):
         margin: Least distance of the pusher from the ends of the face [m].
     """
 
-    length: PositiveMetres = Field(0.1, description="Size along x, the direction of pushing.")
-    width: PositiveMetres = Field(0.1, description="Size along y.")
-    friction: Annotated[float, Field(gt=0.0, le=2.0)] = Field(0.3, description="Friction between pusher and slider.")
-    support: Literal["uniform", "corners"] = Field(
-        "corners", description="Where the weight rests: over the area, or on the corners as in PyBullet."
+    length: PositiveMetres = Field(0.1, description="Size of the slider along x, the direction of pushing.")
+    width: PositiveMetres = Field(0.1, description="Size of the slider along y.")
+    friction: Annotated[float, Field(gt=0.0, le=2.0)] = Field(
+        0.3, description="Coefficient of friction between pusher and slider."
     )
-    margin: PositiveMetres = Field(0.01, description="Least distance of the pusher from the ends of the face.")
+    support: Literal["uniform", "corners"] = Field(
+        "corners",
+        description="Distribution of the pressure under the slider: `uniform` over the area, or at the four "
+        "`corners` as in PyBullet.",
+    )
+    margin: PositiveMetres = Field(0.01, description="Least distance of the pusher from the ends of the pushed face.")
 
     @property
     def face(self) -> float:

@@ -97,10 +97,17 @@ class ApproachConfig(ConfigModel):
             additionally has a constant part, a quarter of `speed`. The total velocity is limited to `speed`.
     """
 
-    speed: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Speed of the pusher.")
-    clearance: PositiveMetres = Field(0.02, description="Distance from the face at which it passes along it.")
-    gap: PositiveMetres = Field(0.004, description="Distance below which it counts as touching.")
-    rate: Annotated[Positive, Unit("1/s")] = Field(5.0, description="Rate at which it approaches points.")
+    speed: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Largest speed of the pusher.")
+    clearance: PositiveMetres = Field(
+        0.02, description="Distance from the face at which the pusher moves parallel to the face."
+    )
+    gap: PositiveMetres = Field(
+        0.004,
+        description="Largest distance from the face at which a push starts. A push ends at three times this distance.",
+    )
+    rate: Annotated[Positive, Unit("1/s")] = Field(
+        5.0, description="Ratio of the pusher's velocity to the distance still to be covered."
+    )
 
 
 def is_pushable(gap: float, contact: float, slider: SliderConfig, config: ApproachConfig, pushes: bool) -> bool:

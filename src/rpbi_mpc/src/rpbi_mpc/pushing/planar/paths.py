@@ -29,16 +29,24 @@ class PathConfig(ConfigModel):
         speed: Speed along the path [m/s].
     """
 
-    shape: Literal["line", "arc", "s", "eight", "points"] = Field("s", description="Shape of the path.")
-    size: PositiveMetres = Field(0.25, description="Length of a line, radius of arcs, half the length of an eight.")
+    shape: Literal["line", "arc", "s", "eight", "points"] = Field(
+        "s",
+        description="Shape of the path: `arc` turns left, `s` is an arc to the left and an arc to the right, "
+        "`points` is a polyline.",
+    )
+    size: PositiveMetres = Field(
+        0.25, description="Length of the line, radius of the arcs, or half the length of the eight."
+    )
     angle: Annotated[Positive, Unit("rad"), Field(le=6.3)] = Field(math.pi / 2, description="Angle of each arc.")
     points: ListOf[Annotated[tuple[float, float], Field(strict=False), Unit("m")]] = Field(
-        (), description="Corners of the path `points`, in the frame of its start."
+        (), description="Corners of the path `points`, in the frame of the path's start."
     )
     start: Annotated[tuple[float, float, float], Field(strict=False), Unit("m, m, rad")] = Field(
-        (0.0, 0.0, 0.0), description="Pose of its start: x, y, yaw."
+        (0.0, 0.0, 0.0), description="Pose of the path's start: x, y, yaw."
     )
-    speed: Annotated[float, Field(gt=0.0, le=0.5), Unit("m/s")] = Field(0.05, description="Speed along it.")
+    speed: Annotated[float, Field(gt=0.0, le=0.5), Unit("m/s")] = Field(
+        0.05, description="Speed of the slider along the path."
+    )
 
 
 class PushPath:

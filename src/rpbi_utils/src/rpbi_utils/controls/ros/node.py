@@ -19,11 +19,15 @@ NAME = "rpbi_controls_node"
 class ControlsParameters(ConfigModel):
     """Private parameters of the controls window."""
 
-    config: Mapping[str, Any] = Field({}, description="Main file of the world; `controls` is read.")
-    robot_name: Text | None = optional("Robot whose joints are shown first, instead of `config/controls/robot_name`.")
-    view: Switch = Field(True, description="Whether RViz's view is in the window, where python3-rviz is installed.")
-    rviz_config: Text | None = optional("Configuration of RViz for the view, instead of this package's.")
-    world_frame: Text = Field("rpbi/world", description="TF frame of the world, for the view.")
+    config: Mapping[str, Any] = Field(
+        {}, description="Content of the world's main file, of which only the key `controls` is used."
+    )
+    robot_name: Text | None = optional(
+        "Robot whose joints the window shows first, instead of `config/controls/robot_name`."
+    )
+    view: Switch = Field(True, description="Whether the window contains RViz's view; requires python3-rviz.")
+    rviz_config: Text | None = optional("RViz configuration file for the view. By default, a file of this package.")
+    world_frame: Text = Field("rpbi/world", description="TF frame of the simulated world, for the view.")
 
 
 def main() -> None:
