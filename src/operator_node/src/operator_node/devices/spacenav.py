@@ -45,7 +45,7 @@ class SpacenavConfig(ConfigModel):
     """Connection and scaling of a 6-D mouse; all parameters except `socket` are named as in ROS's `spacenav_node`."""
 
     socket: Text | None = optional(
-        f"Socket of the daemon. By default, `$SPNAV_SOCKET`, otherwise the socket in `{SETTINGS}`, otherwise `{SOCKET}`."
+        f"Socket of the daemon. Default: `$SPNAV_SOCKET`, otherwise the socket in `{SETTINGS}`, otherwise `{SOCKET}`."
     )
     full_scale: Positive = Field(512.0, description="Raw value of the device at which an axis is 1.")
     linear_scale: Scale = Field(
