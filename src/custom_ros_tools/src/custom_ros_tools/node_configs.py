@@ -178,7 +178,7 @@ class RemappedJoint(ConfigModel):
 
 
 class StartWithin(ConfigModel):
-    """Condition for switching a node on: the robot must be near the first command, so that it does not jump."""
+    """Condition for switching a node on: the robot must be near the first command, to avoid a jump."""
 
     topic: Text = Field(
         description="Topic of the commanded robot's joint states, with the names and units of the commands."

@@ -58,7 +58,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return cast(type[Plugin], pkgutil.resolve_name(self._base))
 
     def name_of(self, thing: Any) -> str:
-        """Returns a class's name, or that of an object's class, in the table; `module:Class` if it is not there."""
+        """Returns the table's name for a class or an object's class, or `module:Class` if the table lacks the class."""
         path = full_name(thing)
         return next((name for name, each in self._paths.items() if each == path), path)
 

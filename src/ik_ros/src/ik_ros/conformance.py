@@ -35,7 +35,7 @@ pickle.dump([solver.solve(problem) for problem in problems], open(sys.argv[1], "
 
 
 class SolverConformance:
-    """Tests that every solver must pass that brings one link to a target pose.
+    """Tests for solvers that bring one link to a target pose.
 
     A subclass sets `solver_name` and `options`, and may override the methods from `make` to `positions`.
 

@@ -35,7 +35,7 @@ class ViaPoint(NamedTuple):
     Attributes:
         progress: Time at which the motion passes the point, as a fraction of the duration.
         point: The point, see `Space`.
-        std: Standard deviation from the point that is allowed when the motion passes it [m or rad].
+        std: Allowed standard deviation of the motion from the point [m or rad].
     """
 
     progress: float

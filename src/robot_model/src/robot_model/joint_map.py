@@ -59,7 +59,7 @@ class AffineMap(NamedTuple):
 
 
 def followed(name: str, mimics: Mapping[str, Mimic]) -> Mimic:
-    """Returns the relation of a mimic joint to the joint that it follows, also if it follows another mimic joint.
+    """Follows the chain of mimic joints that begins at a joint, and returns the joint's relation to the chain's end.
 
     Raises:
         ValueError: If the chain is a loop; the message names the joint.

@@ -187,7 +187,10 @@ class RobotModel:
 
     @cached_property
     def _joint_motions(self) -> tuple[dict[str, Array], dict[str, float]]:
-        """Absolute values of the n factors and of the offset [rad or m] in `map_to`, indexed by moving joint name."""
+        """Absolute values of the n factors and of the offset [rad or m] of each moving joint in the map of `map_to`.
+
+        The two dicts are indexed by joint name.
+        """
         moving = [joint.name for joint in self.all_joints.values() if joint.is_moving]
         factors, offsets = self.map_to(moving)
         return dict(zip(moving, np.abs(factors))), dict(zip(moving, np.abs(offsets).tolist()))

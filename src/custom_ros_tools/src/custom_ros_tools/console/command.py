@@ -120,7 +120,7 @@ class Command:
         return "\n\n".join(filter(None, blocks)) + "\n"
 
     def completions(self) -> Iterator[str]:
-        """Yields lines of the completion file, each with the command, an argument, and the source of its values.
+        """Yields lines of the completion file, each with the command, an argument, and the argument's source of values.
 
         A positional argument is given by its number, the last one by `*`, and an option by its name.
         """

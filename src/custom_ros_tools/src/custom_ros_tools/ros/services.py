@@ -53,7 +53,7 @@ def get_srv_handler(
     Args:
         srv_name: Name of the service.
         srv_type: Type of the service.
-        persistent: Whether to keep one connection open. This is faster, but the proxy fails if the server restarts.
+        persistent: Whether to keep one connection open, which is faster, but fails if the server restarts.
         headers: Additional header fields of the connection.
 
     Raises:

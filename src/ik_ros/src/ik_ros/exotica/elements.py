@@ -53,7 +53,7 @@ def rotation_of(notation: str, numbers: Sequence[float]) -> Quaternion:
         numbers: The rotation in this notation.
 
     Raises:
-        ValueError: If the numbers are not a rotation, or their number is wrong.
+        ValueError: If the numbers are not a rotation, or their count is wrong.
     """
     count, make = NOTATIONS[notation]
     if len(numbers) != count:

@@ -21,7 +21,7 @@ def topics_of(kind: str, name: str) -> str:
 
 
 def trust_only_what_was_named() -> None:
-    """Allows only plug-ins that the node's options have named by now, and forbids importing further plug-ins."""
+    """Forbids imports of plug-ins other than those that the node's options have already named."""
     trust_only({"ik_ros", "rpbi"}, "nodes of ik_ros import only plug-ins that their options name at the start")
 
 

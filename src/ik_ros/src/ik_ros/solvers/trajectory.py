@@ -261,7 +261,7 @@ class TrajectorySolver(KdlSolver):
         return float(np.array(self._distances.map(len(q))(q.T)).min())
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
-        """Checks speeds and accelerations at many times.
+        """Checks speeds and accelerations at many times of the trajectory.
 
         Returns one message for the largest violation of a speed limit, and one for the largest violation of an
         acceleration limit. Without violations, the list is empty.

@@ -85,8 +85,8 @@ class GaussNewton:
         parts: The costs and constraints.
 
     Attributes:
-        lower: Lower limits of the n joints for the present problem [rad or m].
-        upper: Upper limits of the n joints for the present problem [rad or m].
+        lower: Lower limits of the n joints for the current problem [rad or m].
+        upper: Upper limits of the n joints for the current problem [rad or m].
     """
 
     def __init__(self, robot: PinocchioRobot, parts: Sequence[Part]) -> None:

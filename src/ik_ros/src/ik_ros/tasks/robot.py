@@ -218,7 +218,7 @@ class PinocchioRobot:
         return self.with_positions(q, np.minimum(np.maximum(positions, lower), upper))
 
     def update(self, q: np.ndarray) -> None:
-        """Sets the configuration for which `frame` and `jacobian` return results to q."""
+        """Sets the configuration q for which `frame` and `jacobian` return results."""
         pin.computeJointJacobians(self.model, self.data, q)
 
     def frame(self, link_id: int) -> Any:

@@ -173,7 +173,7 @@ class LinkDistances:
     def pieces(self, member: str | int) -> list[Any]:
         """Returns the exact shapes of a link or an obstacle, in the same frames as `solids`.
 
-        The list is empty for planes and point sets, which are always measured as hulls. Only with `geometry="exact"`.
+        The list is empty for planes and point sets, which are always measured as hulls. Requires `geometry="exact"`.
         """
         if isinstance(member, str):
             return self._pieces[member]
@@ -187,7 +187,7 @@ class LinkDistances:
         return self._robot.frames.at(q)
 
     def distance(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> float:
-        """Returns the distance between a pair in the current configuration [m]; inf if it exceeds `most_m`.
+        """Returns the distance between the members of a pair in the current configuration [m]; inf beyond `most_m`.
 
         See `contact` for the arguments.
         """
@@ -195,7 +195,7 @@ class LinkDistances:
         return math.inf if contact is None else contact.distance
 
     def contact(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> Contact | None:
-        """Measures the distance between a pair in the current configuration.
+        """Measures the distance between the members of a pair in the current configuration.
 
         Args:
             pair: Two links, or a link and the number of an obstacle.

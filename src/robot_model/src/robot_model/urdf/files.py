@@ -81,7 +81,7 @@ def found_mesh(name: str, source: Path) -> Path:
 
 
 def mesh_file(mesh: str, source: Path) -> Path:
-    """Finds a mesh in its ROS package or relative to the URDF. Searches `package://` meshes also above the URDF.
+    """Finds a mesh in its ROS package or relative to the URDF, or a `package://` mesh in the folders above the URDF.
 
     Args:
         mesh: File name of the mesh, as written in the URDF.

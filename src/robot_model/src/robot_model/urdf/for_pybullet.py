@@ -136,7 +136,7 @@ def _from_the_root(document: UrdfDocument) -> list[str]:
 
 
 def weigh_frames(robot: Element, masses: Mapping[str, str]) -> None:
-    """Adds inertial elements with the result of `frame_masses` to links of a robot."""
+    """Adds an inertial element to each link of a robot that has an entry in `masses`, the result of `frame_masses`."""
     for link in robot.findall("link"):
         if (mass := masses.get(link.get("name", ""))) is not None:
             link.append(inertial(mass))

@@ -21,7 +21,7 @@ class Subscriptions:
     out of order. Second, it counts closed connections, and therefore does not reconnect after a connection is lost.
 
     Args:
-        manager: rospy's object that receives the reports. From now on, this object receives them instead.
+        manager: rospy's object that receives the reports. The new `Subscriptions` object receives them instead.
         topics: rospy's topic manager.
     """
 
@@ -48,7 +48,7 @@ class Subscriptions:
         self.connect_missing()
 
     def connect_missing(self) -> None:
-        """Starts a thread for each reported publisher without a connection, which connects; returns at once."""
+        """Connects to all reported publishers without a connection, in new threads; does not wait for the threads."""
         with self._lock:
             missing = [pair for pair in self._reported if pair not in self._connecting and not self._has(*pair)]
             self._connecting.update(missing)
