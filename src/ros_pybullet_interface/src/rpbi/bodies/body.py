@@ -117,7 +117,7 @@ class Body:
         return self._link_names[index]
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
-        """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index.
+        """Returns the result of PyBullet's `getDynamicsInfo` for the link with PyBullet's index `link`.
 
         For a body in maximal coordinates, PyBullet returns the inertial frame, restitution, stiffness and damping of
         another body. This method replaces the inertial frame by the identity pose, and the other values by the values
@@ -138,7 +138,7 @@ class Body:
         return (*front, *info[6:8], *damping_and_stiffness, *info[10:])
 
     def change_dynamics(self, link: int, **arguments: Any) -> None:
-        """Calls PyBullet's `changeDynamics` for the link with a given index."""
+        """Calls PyBullet's `changeDynamics` for the link with PyBullet's index `link`."""
         info = self.dynamics_info(link)
         if info[10] == MAXIMAL_COORDINATES and "localInertiaDiagonal" in arguments:
             arguments.setdefault("mass", info[0])  # without it PyBullet makes the body a static one

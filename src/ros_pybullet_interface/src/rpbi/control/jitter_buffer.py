@@ -48,7 +48,8 @@ class Playout(NamedTuple):
         start: Time [ticks] at which set points leave the previous target.
         end: Time [ticks] at which set points reach this target.
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
-        speed: Interval between sending the previous target and this one, divided by the interval between playing both.
+        speed: Interval at which the previous target and this target were sent, divided by the interval at which the two
+            are played.
         pace: Mean interval [ticks] between the arrivals of recent targets.
         gap: Time [ticks] from the end of extrapolation to this target's arrival; 0 if the target came before that end.
         apart: Interval [ticks] from the previous target to this one, by stamps or arrivals; 0 if unknown.
@@ -204,7 +205,7 @@ class JitterBuffer:
         return Playout(before, end, period, interval / (end - before), self._pace, gap)
 
     def _undelayed(self, times: Sequence[float], steps: Sequence[int], regular: bool) -> float:
-        """Estimates the time [ticks], relative to its arrival, at which the newest target would have come undelayed.
+        """Returns the estimated undelayed arrival time [ticks] of the newest target, relative to the actual arrival.
 
         The smallest delay of the recent targets is slightly above zero. The estimate corrects this under the assumption
         that delays are distributed uniformly.

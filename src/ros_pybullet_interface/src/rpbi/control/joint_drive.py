@@ -57,7 +57,7 @@ class JointDrive:
                 self.motors.follow(command)
 
     def drop_targets(self, joints: Iterable[int] | None = None) -> None:
-        """Drops the target streams that contain given joints; the other joints of these streams hold.
+        """Drops each target stream that contains one of `joints`; the other joints of these streams hold.
 
         Args:
             joints: Joint indices. None drops all streams and all waiting targets; all joints then hold.

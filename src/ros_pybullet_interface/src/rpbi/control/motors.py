@@ -220,7 +220,7 @@ class Motors:
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: If the target lacks the quantity of the mode, lengths differ, or a number is not finite.
+            ValueError: If the target lacks the quantity that the mode needs, lengths differ, or a number is not finite.
         """
         mode = self.mode
         values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")

@@ -74,8 +74,8 @@ class SenderClock:
     def _uses(self, stamps: Sequence[float], arrivals: Sequence[float], seen: deque[Arrival]) -> bool:
         """Returns whether the targets' stamps can be used as send times.
 
-        This is so if the stamps agree with the world's time, or if a stall of the world or the sender explains why they
-        do not.
+        This is so if the stamps agree with the world's time, or if a stall of the world or the sender explains why the
+        stamps do not agree.
         """
         is_full = len(seen) == seen.maxlen
         is_in_step = abs(stamps[0] - arrivals[0]) <= self._max_offset - DRIFT * arrivals[0]

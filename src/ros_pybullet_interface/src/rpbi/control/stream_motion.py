@@ -216,8 +216,8 @@ class BoundedMotion:
     def add(self, ways: Mapping[int, float], apart: float, corner: float) -> None:
         """Adds a target, and updates the acceleration bounds.
 
-        Each target's acceleration is estimated from the interval since the previous target, and again from the mean
-        period. The smaller estimate counts.
+        Each target's acceleration is estimated from the interval since the previous target, and once more from the
+        mean period of recent targets. The smaller estimate is used.
 
         Args:
             ways: Displacements [rad or m] from the previous target, keyed by joint index.

@@ -258,7 +258,7 @@ class TargetStreams:
             self._waiting = coalesce(self._waiting, (command,))
 
     def drop(self, joints: Iterable[int]) -> None:
-        """Drops the streams that contain given joints; the other joints of these streams hold.
+        """Drops each stream that contains one of `joints`; the other joints of these streams hold.
 
         Args:
             joints: Indices of joints that other code now drives.

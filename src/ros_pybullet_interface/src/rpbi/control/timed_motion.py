@@ -1,4 +1,4 @@
-"""Motions of joints to goal positions in a given time."""
+"""Motions that move joints to goal positions within a requested duration."""
 
 from collections.abc import Mapping
 

@@ -110,7 +110,7 @@ class CameraVariation(ConfigModel):
     rotation: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest rotation, about a random axis.")
 
     def drawn(self, pose: Pose, random: np.random.Generator) -> Pose:
-        """Returns a random pose near a given pose."""
+        """Returns a random pose near `pose`."""
         offset, angle = random.uniform(-1.0, 1.0, 3) * self.position, random.uniform(-self.rotation, self.rotation)
         axis = random.normal(size=3)
         axis *= math.sin(angle / 2) / np.linalg.norm(axis)

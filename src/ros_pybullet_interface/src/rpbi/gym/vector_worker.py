@@ -102,7 +102,7 @@ class Worker:
         self._shared: SharedArrays | None = None
 
     def spaces(self) -> tuple[list[tuple[spaces.Space[Any], spaces.Space[Any]]], dict[str, Any], str | None]:
-        """Returns each environment's observation and action space, and the first one's metadata and render mode."""
+        """Returns each environment's observation and action space, and metadata and render mode of the first one."""
         env = self._slots[0].env
         each = [(slot.env.observation_space, slot.env.action_space) for slot in self._slots]
         return each, dict(env.metadata), env.render_mode

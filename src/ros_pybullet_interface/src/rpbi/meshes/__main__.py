@@ -26,7 +26,7 @@ FOUND_NOTHING = b"cannot extract anything useful"
 
 
 def main() -> None:
-    """Loads all meshes that the command line names, and reports the result for each one."""
+    """Loads all meshes that the command line names, and reports the result for each mesh."""
     limit_resources(MAX_CPU_S)
     report, *meshes = sys.argv[1:]
     said = tempfile.TemporaryFile()

@@ -108,7 +108,7 @@ class Egl:
         self._context = context
 
     def _gl(self, name: str, result: Any, *arguments: Any) -> Any:
-        """Returns the OpenGL function `name`, given the ctypes types of the function's result and arguments."""
+        """Returns the OpenGL function `name`; `result` and `arguments` are the ctypes types of its signature."""
         address = self._call("eglGetProcAddress", c_void_p, c_char_p(name.encode()))
         if not address:
             raise EglError(f"the driver has no {name}")

@@ -75,7 +75,7 @@ class Frame(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """The streams of a camera that have viewers, for instance ROS subscribers.
+    """Those streams of a camera that have viewers, for instance ROS subscribers.
 
     Attributes:
         streams: Streams with viewers, a subset of `colour`, `jpeg`, `depth`, `segmentation`, `points` and `info`. For

@@ -113,7 +113,7 @@ class Mirror:
         return entry._replace(arguments=(kind, drawn))
 
     def show(self, states: Iterable[BodyState]) -> None:
-        """Sets bodies to given states of the simulator's bodies."""
+        """Sets bodies to `states`, states of the simulator's bodies with the same names."""
         states = tuple(states)
         soft = [state for state in states if state.nodes and state.name in self._bodies]
         if any(self._shown.get(state.name) != state for state in soft):
@@ -151,7 +151,7 @@ class Mirror:
         return frame._replace(**images)
 
     def pose(self, state: BodyState) -> None:
-        """Sets a rigid body to a given state of the same body in the simulator."""
+        """Sets a rigid body to `state`, a state of the same body in the simulator."""
         body = self._bodies.get(state.name)
         shown = self._shown.get(state.name)
         if body is None or shown == state:

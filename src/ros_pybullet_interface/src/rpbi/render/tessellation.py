@@ -44,7 +44,7 @@ class FineShapes:
         }
 
     def of(self, shape: CreateVisualShape) -> CreateVisualShape:
-        """Returns the shape to draw in place of a given visual shape.
+        """Returns the shape to draw in place of the visual shape `shape`.
 
         Primitive shapes, invisible shapes and meshes without a file become meshes from files. A transparent mesh gets
         its own path to its file. Other shapes are returned unchanged.

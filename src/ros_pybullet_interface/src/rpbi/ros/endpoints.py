@@ -45,7 +45,8 @@ class Topic(NamedTuple):
         message_type: ROS type of the messages.
         handler: For a sensor's topic, the function that converts a sample and its stamp [ns] to a message. For an
             input's topic, the function that converts a message to the input's value. For a topic in `BODY_TOPICS`, the
-            function that acts on a body, given the body's context and a message. None if other code handles the topic.
+            function that acts on a body; its arguments are the body's context and a message. None if other code handles
+            the topic.
         meaning: Content of the topic or effect of a message, in a sentence, with the YAML key that sets the rate.
         key: Key in the main YAML file; the key opens the topic, or sets the topic's rate, where 0 is off. Empty if the
             topic is always open.
@@ -69,7 +70,7 @@ class Service(NamedTuple):
     Attributes:
         name: Name of the service, with `{name}` in place of the name of the body, sensor or controller.
         service_type: ROS type of the service.
-        handler: Takes the context that `serve` was given and a request. Returns an Answer, the response, or the
+        handler: Takes the argument `context` of `serve`, and a request. Returns an Answer, the response, or the
             response's fields. To refuse the request, the handler raises an InterfaceError or ValueError. The client
             then gets `success=False` and the error's message; if the response has no field `success`, the call fails.
             None if other code opens the service.

@@ -21,7 +21,10 @@ FRAMES = {
 
 
 def use_prefix(prefix: str | None) -> None:
-    """Sets the prefix of all frames of this node's world, so that two worlds can share a TF tree; None removes it."""
+    """Sets the prefix of all frames of this node's world, so that two worlds can share a TF tree.
+
+    None removes the prefix.
+    """
     global _prefix
     _prefix = f"{prefix}/" if prefix else ""
 

@@ -34,13 +34,13 @@ def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
 
 
 def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
-    """Waits for a message on a robot's `initial_joint_state_topic`; returns a configuration with its positions.
+    """Waits for a message on a robot's `initial_joint_state_topic`; returns the configuration with received positions.
 
     Joints that the message does not name start as configured. Joints that the robot lacks are ignored. A configuration
     without `initial_joint_state_topic` is returned unchanged. Errors name the YAML file `file`.
 
     Raises:
-        ConfigError: If no message arrives in time, or its positions are invalid or all belong to unknown joints.
+        ConfigError: If no message arrives in time, or the received positions are invalid or all for unknown joints.
     """
     if not isinstance(config, RobotConfig) or config.initial_joint_state_topic is None:
         return config

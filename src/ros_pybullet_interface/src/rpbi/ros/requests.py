@@ -35,18 +35,19 @@ class Requests:
             even_if_busy: Whether to call the function even while the world is being restored.
 
         Raises:
-            InterfaceError: If the world is being restored, the simulation has ended, the node shuts down or the loop
-                makes no progress.
+            InterfaceError: If the world is being restored, the simulation has ended, the node shuts down or the
+                simulation loop makes no progress.
         """
         if self._simulation.is_own_thread:
             return call()
         return self.wait_for(self._simulation.world.mailbox.request(call, even_if_busy))
 
     def wait_for(self, future: Future[T]) -> T:
-        """Waits for a future that the simulation thread completes; returns its result or raises its exception.
+        """Waits for a future that the simulation thread completes; returns the future's result or raises its exception.
 
         Raises:
-            InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
+            InterfaceError: If the simulation has ended, the node shuts down or the simulation loop makes no
+                progress.
         """
         passes, progress_s = self._simulation.passes, time.monotonic()
         while not wait([future], timeout=0.2).done:

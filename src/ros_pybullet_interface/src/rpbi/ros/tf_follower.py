@@ -66,7 +66,7 @@ class WatchedTf:
 
 
 def refusal(slot: str, taken: Input, error: Exception) -> Exception:
-    """Returns the error to report when an input's value was refused.
+    """Returns the error to report after an input has refused a value.
 
     An InterfaceError or ValueError is returned as it is. Other errors in code of another package are returned as a
     PluginError.
@@ -84,7 +84,7 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
 class FollowedFrame:
     """A pose input, and the state of the TF frame that it follows.
 
-    The frame is looked up about once in each period of `pose_input.hz`, at the arrival of a transform. Look-ups at
+    The frame is looked up about once in each period `1 / pose_input.hz`, at the arrival of a transform. Look-ups at
     other times would make the steps of a motion uneven. A frame that only moves with its parent, so that its own
     transforms do not arrive, is looked up once in each period.
     """
@@ -105,7 +105,7 @@ class FollowedFrame:
     def due_s(self, came_s: float) -> float:
         """Returns the time [s] of the next look-up of the frame's pose, on the monotonic clock.
 
-        A period is the reciprocal of the look-up rate `pose_input.hz`. The look-up is due:
+        A period is `1 / pose_input.hz`. The look-up is due:
 
         - one period after the last look-up, if no transform of the frame has arrived since the last look-up;
         - LOOK_UNTIL periods after the last look-up, if a transform has arrived less than LOOK_FROM periods after

@@ -64,7 +64,7 @@ class SeededNoise:
 
 
 class Zeroing:
-    """Computes the mean of a given number of samples; the mean becomes a sensor's new zero.
+    """Computes the mean of `count` samples; the mean becomes a sensor's new zero.
 
     Args:
         count: Number of samples.

@@ -37,7 +37,7 @@ class SensedBody(Protocol):
         """Returns the name of the link with a given PyBullet index; -1 is the root."""
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
-        """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index."""
+        """Returns the result of PyBullet's `getDynamicsInfo` for the link with PyBullet's index `link`."""
 
     def base_pose(self) -> Pose:
         """Returns the pose of the root link's URDF frame in the world frame."""

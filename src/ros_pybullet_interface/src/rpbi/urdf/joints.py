@@ -206,7 +206,7 @@ class JointModel:
             offsets: True adds the offsets of couplings, as needed for positions; False is for velocities.
 
         Returns:
-            The given values, and the values of the mimic joints whose leaders are in `positions`.
+            The values in `positions`, and the values of the mimic joints whose leaders are in `positions`.
         """
         followers = {
             index: multiplier * positions[leader] + (offset if offsets else 0.0)

@@ -66,7 +66,7 @@ class Subtree:
         return states
 
     def momentum(self, states: LinkStates) -> Momentum:
-        """Returns the momentum of the subtree for given poses and velocities of its links."""
+        """Returns the momentum of the subtree, computed from the links' poses and velocities in `states`."""
         origin, quat = states[0][4], states[0][5]
         linear = angular = mass_moment = (0.0, 0.0, 0.0)
         for (mass, inertia), (centre, inertial_quat, _, _, _, _, velocity, turning) in zip(self._inertias, states):

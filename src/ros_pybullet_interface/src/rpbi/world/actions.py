@@ -78,8 +78,8 @@ class Action(NamedTuple):
 
     Attributes:
         do: Function that applies the action, with three arguments: the body, the world's clock and the value.
-        value: Function that converts a given value to the type that `do` requires, for instance a mapping to a named
-            tuple. Raises ValueError if the value cannot be converted.
+        value: Function that converts the caller's value to the type that `do` requires, for instance a mapping to a
+            named tuple. Raises ValueError if the value cannot be converted.
     """
 
     do: Callable[[Any, Clock, Any], Any]

@@ -1,4 +1,7 @@
-"""Recognises the kind of a file from the content, to report a wrong file, such as a robot file given as a world."""
+"""Recognises the kind of a file from its content, to report a file of the wrong kind.
+
+For example, a user may name a robot's file where the main file of a world is expected.
+"""
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress

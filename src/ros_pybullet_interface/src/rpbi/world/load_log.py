@@ -81,7 +81,7 @@ class LoadLogReader:
     """Reads the new entries of a load log.
 
     Args:
-        log: The log, which may grow at any time. When the world is reset, the log is cleared and starts again.
+        log: The load log, which may grow at any time. A reset of the world clears the log, which then starts again.
     """
 
     def __init__(self, log: Sequence[LogEntry]) -> None:

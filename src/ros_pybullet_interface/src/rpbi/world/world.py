@@ -825,7 +825,7 @@ class World:
             A prediction for each candidate, in the order of the candidates.
 
         Raises:
-            InterfaceError: If the state cannot be saved, or the other process does not reach the same state.
+            InterfaceError: If the state cannot be saved, or the shadow (see `fork`) does not reach the same state.
             UnknownNameError: If a watched body is unknown.
             ValueError: If `ticks`, `every` or `jobs` is not positive.
         """

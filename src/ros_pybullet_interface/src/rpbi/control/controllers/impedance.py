@@ -1,7 +1,7 @@
 """Springs and dampers that stay stable for any stiffness at the simulation's time step.
 
-A spring of stiffness k on a mass m that is integrated explicitly diverges if k dt^2 / m is large. Here the spring force
-is computed for the joint position at the end of the tick. That position is predicted from the mass matrix (Tan, Liu and
+With explicit integration, a spring of stiffness k on a mass m diverges if k dt^2 / m is large. Here the spring force is
+computed for the joint position at the end of the tick. That position is predicted from the mass matrix (Tan, Liu and
 Turk, "Stable Proportional-Derivative Controllers", 2011) and from an estimate of the external efforts.
 """
 

@@ -36,7 +36,7 @@ class HandTask(WorldTask):
         self._link = link_index(robot_of(world, config.robot), config.link)
 
     def hand_action(self, axes: str = "xyz") -> HandAction:
-        """Returns an action part that translates the hand along given axes."""
+        """Returns an action part that translates the hand along the axes of the world that `axes` names."""
         config = self.config
         return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
 

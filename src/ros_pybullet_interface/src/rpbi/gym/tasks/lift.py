@@ -63,7 +63,7 @@ class LiftTask(HandTask):
         return self.lifted() - math.dist(self.hand(), self.position_of(self.config.object))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the body is high enough, and only the robot touches it."""
+        """Returns whether the body is high enough, and only the robot touches the body."""
         if self.lifted() < self.config.height:
             return False
         return {other for other, _ in self.touches(self.config.object)} == {self.config.robot}

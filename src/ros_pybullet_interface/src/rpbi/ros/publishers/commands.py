@@ -92,7 +92,7 @@ class CommandPublisher:
 
 
 def commands_message(world: World, first: int) -> WorldCommands:
-    """Returns a message with a world's commands from a given index on, at most MAX_COMMANDS_PER_MESSAGE of them."""
+    """Returns a message with a world's commands from index `first` on, at most MAX_COMMANDS_PER_MESSAGE commands."""
     first, commands = world.commands.since(first, MAX_COMMANDS_PER_MESSAGE)
     message = WorldCommands(resets=world.resets, first=first, commands=[_message(each) for each in commands])
     message.header.stamp = to_ros_time(world.clock.stamp_ns)

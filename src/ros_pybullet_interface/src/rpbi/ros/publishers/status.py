@@ -62,7 +62,7 @@ def _warn_of_rivals() -> None:
 
 
 def clock_message(stamp_ns: int) -> ClockMessage:
-    """Returns a /clock message with a given time [ns]."""
+    """Returns a /clock message with the time `stamp_ns` [ns]."""
     return ClockMessage(to_ros_time(stamp_ns))
 
 

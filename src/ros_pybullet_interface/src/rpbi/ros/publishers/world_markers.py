@@ -51,7 +51,7 @@ def shape_marker(name: str, number: int, shape: BodyShape, frame: str, pose: Pos
 
 
 def deletion(marker: Marker) -> Marker:
-    """Returns a marker message that deletes a given marker."""
+    """Returns a marker message that deletes `marker`."""
     gone = Marker(ns=marker.ns, id=marker.id, action=Marker.DELETE)
     gone.header.frame_id = marker.header.frame_id
     return gone

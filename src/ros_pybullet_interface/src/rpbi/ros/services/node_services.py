@@ -197,7 +197,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
     """Reads the YAML of an object from the file or text of a request.
 
     Returns:
-        The content, the name of the file for error messages, and the path of the file. Relative paths in the content
+        The YAML's content, the file's name for error messages, and the path of the file. Relative paths in the content
         are relative to the folder of the file. For text, the path is NO_FOLDER, and relative paths are searched only in
         the world's search paths and PyBullet's data, since the caller's working directory is unknown.
     """

@@ -42,7 +42,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
 def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
     """Moves all joints to their start positions in `duration` [s], and answers at the end of the motion.
 
-    The state in the request is ignored.
+    The joint state in the request is ignored.
     """
     return Answer(*_move(context, context.body.start_positions(), request.duration))
 

@@ -51,7 +51,7 @@ def follow_command(context: BodyContext, message: JointTrajectory) -> None:
 
 
 def query_state(context: BodyContext, request: Any) -> Any:
-    """Returns the trajectory follower's desired joint positions, velocities and accelerations at the given time."""
+    """Returns the trajectory follower's desired joint positions, velocities and accelerations at the requested time."""
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 

@@ -83,7 +83,7 @@ class PoseNoise:
         self._noise = SeededNoise(seed, (*config.noise_m, *[config.noise_rad] * 3), [0.0] * 6)
 
     def on(self, pose: Pose, tick: int) -> Pose:
-        """Returns a pose with the noise of a given tick added."""
+        """Returns `pose` with the noise of a tick added."""
         x, y, z, *turn = self._noise.at(tick).tolist()
         rotated = Pose((0.0, 0.0, 0.0), quaternion_of((turn[0], turn[1], turn[2]))) @ Pose(
             (0.0, 0.0, 0.0), pose.quat_xyzw
@@ -92,7 +92,7 @@ class PoseNoise:
 
 
 class Delay(Generic[Measured]):
-    """Buffers measurements until they have a given age.
+    """Buffers measurements until they have a minimum age.
 
     Args:
         ticks: Minimum age of a returned measurement [ticks].
@@ -108,7 +108,7 @@ class Delay(Generic[Measured]):
             self._waiting.append((tick, measured))
 
     def newest(self, tick: int) -> tuple[int, Measured] | None:
-        """Returns the newest measurement that is old enough at a given tick, as a pair of tick and measurement.
+        """Returns the newest measurement that is old enough at `tick`, as a pair of its tick and the measurement.
 
         Returns None if all measurements are too new.
         """

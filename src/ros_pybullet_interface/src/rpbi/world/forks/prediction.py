@@ -14,7 +14,7 @@ from custom_ros_tools.transforms import Array
 
 
 class PlannedInput(NamedTuple):
-    """An input at a given tick of a prediction.
+    """An input, and the tick of a prediction at which the input is applied.
 
     Attributes:
         tick: Number of ticks after the start of the prediction; 0 means before the first step.
@@ -104,7 +104,7 @@ def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
 
 
 class _Notes:
-    """Samples of the motion of given bodies."""
+    """Samples of the motion of the watched bodies."""
 
     def __init__(self, world: Any, watch: Sequence[str]) -> None:
         self._world, self._bodies = world, [world.bodies[name] for name in watch]
@@ -131,7 +131,7 @@ class _Notes:
             self._forces[body.name].append(sum(point.normal_force for point in touching))
 
     def prediction(self, cost: float, state_hash: str) -> Prediction:
-        """Returns all samples as arrays, together with the given cost and hash."""
+        """Returns a `Prediction` with all samples as arrays, and with `cost` and `state_hash`."""
         poses, joints, forces = (
             {name: np.array(rows) for name, rows in each.items()} for each in (self._poses, self._joints, self._forces)
         )
