@@ -175,7 +175,7 @@ class ProblemStream:
     def _complete(self, start: JointPositions) -> JointPositions:
         """Returns the start after checking that it has all joints or is empty.
 
-        Otherwise, the robot would jump to guessed positions.
+        With an incomplete start, the robot would jump to guessed positions.
         """
         missing = [name for name in self._solver.joint_names if name not in start]
         if start and missing:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MIN_SAMPLES = 10
-"""Least number of samples; demonstrations with fewer samples are rejected."""
+"""Smallest number of samples; demonstrations with fewer samples are rejected."""
 MAX_GAP_SHARE = 0.1
 """Largest time between two samples, as a fraction of the duration. A longer gap is rejected as a jump in time."""
 MAX_TURN_RAD = 1.5

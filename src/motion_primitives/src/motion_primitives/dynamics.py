@@ -26,7 +26,7 @@ COASTING = (0.0, 1.0, 0.0, -6.0, 8.0, -3.0)
 """Coefficients (powers 0 to 5) of the quintic polynomial from 0 to 0 that starts with velocity 1 and ends at rest. The
 second derivative is 0 at both ends."""
 MIN_CHANGE_SHARE = 0.25
-"""Least duration of the transition to a new goal, as a fraction of the motion's duration."""
+"""Smallest duration of the transition to a new goal, as a fraction of the motion's duration."""
 
 
 class MotionState(NamedTuple):

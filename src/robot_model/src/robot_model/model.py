@@ -61,7 +61,7 @@ class RobotModel:
     Attributes:
         urdf_path: Path of the URDF.
         document: The parsed URDF.
-        all_joints: All joints of the URDF by name.
+        all_joints: All joints of the URDF, indexed by name.
         joint_names: Names of the n driven joints.
         joints: Descriptions of the n driven joints.
         limits: Limits of the n driven joints.

@@ -20,8 +20,8 @@ class XmlRecord(NamedTuple):
 
     Attributes:
         kind: Tag of the element, such as `EffFrame`.
-        fields: Value of each XML attribute and of each child element, by name. The value of a child element is its
-            text, or the list of its own child elements.
+        fields: Value of each XML attribute and of each child element, indexed by name. The value of a child element is
+            the element's text, or a list of nested child elements.
     """
 
     kind: str

@@ -61,7 +61,7 @@ class ExoticaSolver(Solver):
 
     Attributes:
         config: The options.
-        maps: All task maps by name, including task maps without a cost.
+        maps: All task maps, indexed by name, including task maps without a cost.
         scene: The robot and the additional frames.
 
     Raises:

@@ -27,4 +27,4 @@ TASKS: PluginTable[Task] = PluginTable(
         "distance": "ik_ros.tasks.distance:Distance",
     },
 )
-"""All types of tasks by name. A task's module is only imported when the task is looked up, since it needs Pinocchio."""
+"""All types of tasks, indexed by name. A task's module needs Pinocchio, and is only imported when it is looked up."""

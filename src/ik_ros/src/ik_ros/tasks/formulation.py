@@ -140,7 +140,7 @@ class TaskSet:
     Attributes:
         robot: The robot.
         base_frame: Name of the frame in which poses are expressed.
-        parts: All tasks by name, the costs first.
+        parts: All tasks, indexed by name, the costs first.
         main: Name of the task that takes a problem's target as the goal; None if the formulation has no such task.
 
     Raises:

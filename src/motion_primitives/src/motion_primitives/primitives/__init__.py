@@ -12,4 +12,4 @@ PRIMITIVES: PluginTable[Primitive] = PluginTable(
         "promp": "motion_primitives.primitives.promp:ProMP",
     },
 )
-"""All primitives by name."""
+"""All primitives, indexed by name."""

@@ -57,7 +57,7 @@ class UrdfDocument:
     Attributes:
         tag: Tag of the top element, `robot` in a URDF.
         links: Names of all links.
-        joint_types: Type of each joint by name, such as `revolute` or `fixed`.
+        joint_types: Type of each joint, such as `revolute` or `fixed`, indexed by joint name.
         edges: Names of each joint and of the two links that the joint connects, in the file's order.
         meshes: File names of all meshes, as written in the file.
         source: Path of the file that was read.
@@ -87,7 +87,7 @@ class UrdfDocument:
 
     @cached_property
     def joints(self) -> dict[str, UrdfJoint]:
-        """All joints by name.
+        """All joints, indexed by name.
 
         Raises:
             ValueError: If a value of a joint is invalid; the message names the joint.
