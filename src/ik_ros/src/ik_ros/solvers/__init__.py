@@ -16,5 +16,5 @@ SOLVERS: PluginTable[Solver] = PluginTable(
         "trajectory": "ik_ros.solvers.trajectory:TrajectorySolver",
     },
 )
-"""All solvers, indexed by name. A solver's module is imported when the solver is looked up, so a missing library only affects
-the solvers that need the library."""
+"""All solvers, indexed by name. A solver's module is imported when the solver is looked up, so a missing library only
+affects the solvers that need the library."""
