@@ -108,7 +108,7 @@ def _square(outward: Array) -> SurfaceMesh:
 
 
 def _corners(radius: float) -> int:
-    """Returns the number of corners, a multiple of 4, of the polygon that replaces a circle; `radius` is in m."""
+    """Returns the number of corners, a multiple of 4, of the polygon that replaces a circle of radius `radius` [m]."""
     needed = np.pi / np.arccos(1.0 - min(TOLERANCE_M / radius, 1.0))
     return int(np.clip(4 * np.ceil(needed / 4), MIN_CORNERS, MAX_CORNERS))
 

@@ -27,7 +27,7 @@ BURST_S = 0.005
 
 
 class StepRequest:
-    """A request to run one or more ticks, and the number of remaining ticks; the caller waits for `done`."""
+    """A request to run ticks, and the number of remaining ticks; the caller waits for `done`."""
 
     def __init__(self, steps: int) -> None:
         self.done: Future[tuple[int, int]] = Future()

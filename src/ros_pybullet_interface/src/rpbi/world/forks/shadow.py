@@ -114,7 +114,7 @@ class Fork(Remote):
         self.ask("act", name, what, value)
 
     def step(self, ticks: int = 1) -> list[Any]:
-        """Advances the fork's world by one or more ticks, and returns the sensor samples of all these ticks."""
+        """Advances the fork's world by `ticks` ticks, and returns the sensor samples of all these ticks."""
         return list(self.ask("step", ticks))
 
     def state_hash(self) -> str:
