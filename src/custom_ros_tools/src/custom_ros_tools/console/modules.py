@@ -28,7 +28,7 @@ def module_names(root: Path) -> list[str]:
 
 
 def modules_of(package: str) -> list[str]:
-    """Returns the full names of the modules in a Python package that may contain commands."""
+    """Returns the full names of all modules directly in a Python package."""
     return [f"{package}.{each.name}" for each in pkgutil.iter_modules(importlib.import_module(package).__path__)]
 
 
