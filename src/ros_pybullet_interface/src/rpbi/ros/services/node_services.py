@@ -140,9 +140,8 @@ def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, g
 
 
 def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Advances the world by several ticks, as `rpbi/step_n` does.
-
-    Applies each input of the request before the tick that the request gives for the input.
+    """Advances the world by several ticks, as `rpbi/step_n` does, and applies each input of the request before the tick
+    that the request gives for it.
     """
     waiting = sorted(map(planned_input, request.inputs), key=lambda each: each.tick)
     if waiting and waiting[-1].tick >= max(request.steps, 1):

@@ -78,7 +78,7 @@ class StampedActionServer(ActionServer):
 
 
 class _StampedTopic(FastTopic):
-    """A topic that stamps messages with the world's clock, and has the methods of a publisher that actionlib calls."""
+    """A topic that stamps messages with the world's clock, and has the publisher methods that actionlib calls."""
 
     def __init__(self, topic: str, message_type: type, clock: Clock) -> None:
         super().__init__(topic, message_type)
