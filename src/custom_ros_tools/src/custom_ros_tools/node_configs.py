@@ -193,8 +193,8 @@ class RemapConfig(ConfigModel):
 
     joint_names: ListOf[Text] | None = Field(
         None,
-        description="Joints that are forwarded, by their names in received messages; defines their order. By "
-        "default, all joints in the order received.",
+        description="Names of the forwarded joints in received messages, in the order in which they are published. "
+        "By default, all joints in the order received.",
     )
     joints: ListOf[RemappedJoint] = Field((), description="Joints whose name or unit differs at the driver.")
     inverse: Switch = Field(

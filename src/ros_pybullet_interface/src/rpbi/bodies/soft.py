@@ -40,7 +40,9 @@ class SoftObjectConfig(BodyConfig):
     createSoftBodyAnchor: ListOf[AnchorEntry] = Field(
         (), description="Mesh vertices that are tied to bodies or to the world, each as [node, body, link, position]."
     )
-    changeVisualShape: ChangeVisualShape | None = Field(None, description="Colours of the body.")
+    changeVisualShape: ChangeVisualShape | None = Field(
+        None, description="Colours of the body. By default, PyBullet's colours."
+    )
     surface_hz: HzOrOff = Field(20.0, description="Rate of the surface markers for RViz; 0 is off.")
     contacts: ContactsConfig | None = Field(
         None,

@@ -106,8 +106,8 @@ class RobotConfig(BodyConfig):
     )
     initial_joint_state_topic: str | None = Field(
         None,
-        description="Topic of joint states, for instance of a real robot. Their positions replace the start "
-        "positions of the same joints. By default, there is no such topic.",
+        description="Topic of joint states, for instance of a real robot, whose positions replace "
+        "`initial_joint_position`. By default, only `initial_joint_position` is used.",
     )
     initial_joint_state_timeout_s: Seconds = Field(
         5.0, description="Longest wait for a message on `initial_joint_state_topic`, in wall time."
