@@ -114,7 +114,7 @@ class MarkerConfig(ConfigModel):
     mesh_resource: Text | None = Field(
         None,
         description="Mesh file: `package://`, `{package}/`, `file://`, `http://` or an absolute path; required for "
-        "`mesh_resource`.",
+        "the type `mesh_resource`.",
     )
 
     @model_validator(mode="after")

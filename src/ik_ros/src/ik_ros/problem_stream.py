@@ -24,8 +24,8 @@ class JointRateLimiterConfig(ConfigModel):
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Fraction of the velocity limits that is used.")
     max_period_s: Positive = Field(
         0.1,
-        description="Longest time between two targets that is taken into account [s]: after a longer pause, a target "
-        "moves no further than after this time.",
+        description="Largest time step between two targets [s]. After a longer pause, the next target moves only as "
+        "far as in this time.",
     )
     hold: bool = Field(
         False,

@@ -40,7 +40,7 @@ class FrameSource(ConfigModel):
 class JointSource(ConfigModel):
     """Joints whose positions over time are used as a demonstration."""
 
-    topic: TopicName = Field("joint_states", description="Topic of the joint states, also in bags.")
+    topic: TopicName = Field("joint_states", description="Topic of the joint states, both live and in bags.")
     names: ListOf[Text] = Field(
         min_length=1, description="Names of the joints, in the order of the positions in a point."
     )
@@ -151,7 +151,7 @@ class PrimitivesNodeConfig(ConfigModel):
     )
     bounds: dict[Text, Bounds] = Field(
         {},
-        description="Least and largest position [m or rad], keyed by position name. A plan that exceeds them is "
+        description="Least and largest position [m or rad], keyed by position name. A plan beyond these bounds is "
         "refused.",
     )
     hz: Hz = Field(100.0, description="Rate at which TF is recorded and motions are executed, in wall time.")

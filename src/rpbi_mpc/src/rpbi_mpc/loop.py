@@ -34,8 +34,8 @@ class LoopConfig(ConfigModel):
     )
     max_missed: Annotated[int, Field(ge=0)] = Field(
         5,
-        description="Largest number of successive cycles without a new plan, which execute the last plan. Then the "
-        "loop stops.",
+        description="Largest number of successive cycles without a new plan. These cycles execute the last plan; "
+        "afterwards, the loop stops.",
     )
 
     @model_validator(mode="after")

@@ -20,10 +20,14 @@ class LimitsConfig(ConfigModel):
     """Joint limits, which narrow the limits in the robot's URDF."""
 
     lower: dict[str, float] = Field(
-        {}, description="Lower position limits above those of the URDF [rad or m], keyed by joint name."
+        {},
+        description="Lower position limits [rad or m], keyed by joint name. They may narrow the range in the URDF, "
+        "but not widen it.",
     )
     upper: dict[str, float] = Field(
-        {}, description="Upper position limits below those of the URDF [rad or m], keyed by joint name."
+        {},
+        description="Upper position limits [rad or m], keyed by joint name. They may narrow the range in the URDF, "
+        "but not widen it.",
     )
     position_factor: Factor = Field(
         1.0, description="Fraction of each joint's range, about the middle of the range, that is used."

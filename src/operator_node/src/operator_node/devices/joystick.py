@@ -38,8 +38,8 @@ class JoystickConfig(ConfigModel):
         "/dev/input/js0", description="Path whose number selects the joystick; `/dev/input/js0` selects the first one."
     )
     dev_name: Text | None = optional(
-        "Part of the joystick's name. By default, `dev` selects the joystick; otherwise the first joystick with a "
-        "matching name is used."
+        "Part of the joystick's name; the first joystick that matches is used instead of `dev`. By default, `dev` "
+        "selects the joystick."
     )
     deadzone: float = Field(0.05, ge=0.0, lt=1.0, description="Fraction of an axis's range that counts as 0.")
     sticky_buttons: Switch = Field(

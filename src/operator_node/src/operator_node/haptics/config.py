@@ -54,15 +54,16 @@ class ForceFeedbackConfig(ConfigModel):
         0.0,
         ge=0.0,
         le=0.1,
-        description="Energy that the device may give out without energy having been put in [J]; 0 is strictly passive.",
+        description="Energy that the device may give out in excess of the energy that was put in [J]; 0 is strictly "
+        "passive.",
     )
     energy_refill_w: float = Field(
         0.0, ge=0.0, le=0.1, description="Power at which `energy_allowance_j` is restored [W]; 0 is strictly passive."
     )
     clutch_button: Count | None = Field(
         None,
-        description="Index of the button that couples handle and tool while it is held. By default, they are always "
-        "coupled.",
+        description="Index of the button that couples handle and tool while it is held. By default, handle and tool "
+        "are always coupled.",
     )
     motion_scale: Vec3 = Field(
         (1.0, 1.0, 1.0),

@@ -82,7 +82,7 @@ class LoadURDF(PybulletModel):
     )
     basePosition: Position | None = optional("Position of the base in the world. By default, the origin.")
     baseOrientation: Quat | None = optional(
-        "Orientation of the base in the world, x, y, z, w. By default, that of the world."
+        "Orientation of the base in the world, x, y, z, w. By default, the base has the world's orientation."
     )
     useFixedBase: Switch | None = optional("Whether the base is fixed to the world. By default, it is not.")
     useMaximalCoordinates: Switch | None = optional(
@@ -175,7 +175,7 @@ class ChangeDynamics(PybulletModel):
     )
     rollingFriction: NonNegative | None = optional("Coefficient of friction against rolling.")
     restitution: NonNegative | None = optional(
-        "Coefficient of restitution: with 0 the body does not bounce, with 1 it loses no energy."
+        "Coefficient of restitution: with 0 the body does not bounce, with 1 a bounce loses no energy."
     )
     linearDamping: NonNegative | None = optional("Fraction of the linear velocity that is lost per second.")
     angularDamping: NonNegative | None = optional("Fraction of the angular velocity that is lost per second.")
@@ -261,7 +261,7 @@ class LoadSoftBody(PybulletModel):
 
     fileName: ExistingFile = Field(description="Mesh file: tetrahedra (.vtk) or a surface (.obj).")
     simFileName: ExistingFile | None = optional(
-        "Mesh file for the simulation (.vtk). By default, `fileName`; otherwise `fileName` is only displayed."
+        "Mesh file (.vtk) that is simulated, while `fileName` is only displayed. By default, `fileName` is simulated."
     )
     basePosition: Position | None = optional("Start position in the world.")
     baseOrientation: Quat | None = optional("Start orientation in the world, x, y, z, w.")

@@ -84,7 +84,9 @@ class SetPhysicsEngineParameter(PybulletModel):
     useSplitImpulse: Switch | None = optional(
         "Whether penetration is corrected separately, without effect on velocities."
     )
-    splitImpulsePenetrationThreshold: Metres | None = optional("Penetration above which it is corrected separately.")
+    splitImpulsePenetrationThreshold: Metres | None = optional(
+        "Penetration depth above which `useSplitImpulse` has an effect."
+    )
     numSubSteps: Annotated[Count, Field(le=1_000)] | None = optional("Number of parts into which each step is divided.")
     collisionFilterMode: Count | None = optional(
         "Rule for collision filters: 0 if the masks of both bodies must match, 1 if one match is enough."

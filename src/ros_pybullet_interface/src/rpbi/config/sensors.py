@@ -42,15 +42,15 @@ class SensorConfig(ConfigModel):
 class ContactsConfig(ConfigModel):
     """Publication of a body's contacts."""
 
-    hz: Hz = Field(50.0, description="Rate of `rpbi/NAME/contacts`.")
+    hz: Hz = Field(50.0, description="Rate of the messages on `rpbi/NAME/contacts`.")
     average: Switch = Field(
         False,
-        description="Whether forces are averaged over all ticks since the last message, otherwise those of the last "
-        "tick.",
+        description="Whether contact forces are averaged over all ticks since the last message, otherwise over the "
+        "last tick only.",
     )
     arrows_hz: HzOrOff = Field(20.0, description="Rate of the arrows that RViz shows; 0 is off.")
     arrow_metres_per_newton: Annotated[Positive, Unit("m/N")] = Field(
-        0.01, description="Length of an arrow for each newton of its force."
+        0.01, description="Length of an arrow per newton of contact force."
     )
 
 
@@ -73,10 +73,13 @@ class ForceTorqueConfig(ConfigModel):
     joint: Text = Field(description="Joint that contains the sensor.")
     hz: Hz | None = optional("Rate of the samples. By default, the rate of the joint states.")
     frame_id: FrameId | None = optional(
-        "Frame name in messages, instead of the name of the joint's child link, in whose frame samples are given."
+        "Name of the frame in messages. By default, the TF frame of the joint's child link. Samples are always in "
+        "the axes of this link."
     )
     acting: Literal["parent_on_child", "child_on_parent"] = Field(
-        "parent_on_child", description="Direction of the measured force and torque, which determines their sign."
+        "parent_on_child",
+        description="Whether the force and torque of the parent link on the child link are measured, or those of the "
+        "child link on the parent link.",
     )
     low_pass_hz: Hz | None = optional(
         "Cut-off frequency (-3 dB) of a first-order low-pass filter. By default, samples are not filtered."
@@ -138,8 +141,8 @@ class RgbdSensorConfig(ConfigModel):
     depth_noise_m: NonNegativeMetres = Field(0.0, description="Standard deviation of the depth noise.")
     depth_noise_growth_per_m: Annotated[NonNegative, Unit("1/m")] = Field(
         0.0,
-        description="Factor of the squared depth that is added to the standard deviation of the depth noise; about "
-        "0.0014 for a structured-light camera.",
+        description="Growth of the depth noise: this value times the squared depth is added to the standard "
+        "deviation. About 0.0014 for a structured-light camera.",
     )
     seed: Count | None = optional("Seed of the depth noise. By default, computed from the name of the camera.")
     intrinsics: IntrinsicsConfig = Field(IntrinsicsConfig(), description="Image size, field of view and range.")

@@ -93,11 +93,11 @@ WORLD_FRAME = "rpbi/world"
 class StaticFrame(ConfigModel):
     """A TF frame with a fixed pose, which the interface publishes. No other node should publish the frame."""
 
-    tf_id: FrameId = Field(description="Name of the frame.")
+    tf_id: FrameId = Field(description="Name of the TF frame.")
     parent: FrameId = Field(WORLD_FRAME, description="Parent frame, in which position and orientation are given.")
     position: Position = Field((0.0, 0.0, 0.0), description="Position in the parent frame.")
     orientation: Quat | None = optional(
-        "Orientation in the parent frame, x, y, z, w. By default, that of the parent frame."
+        "Orientation in the parent frame, x, y, z, w. By default, the frame is not rotated."
     )
     rpy: Annotated[Vec3, Unit("rad")] | None = optional(
         "Orientation in the parent frame as roll, pitch and yaw about the fixed x, y and z axes, in this order; "

@@ -66,7 +66,7 @@ class PoseVariation(ConfigModel):
 
     object: Name = Field(description="Name of the body.")
     position: Annotated[Vec3, Unit("m")] = Field(
-        (0.0, 0.0, 0.0), description="Largest offsets along x, y and z, in both directions."
+        (0.0, 0.0, 0.0), description="Largest offsets along the world's x, y and z axes, in both directions."
     )
     yaw: Annotated[NonNegative, Unit("rad")] = Field(
         0.0, description="Largest rotation about the vertical, in both directions."
@@ -105,7 +105,7 @@ class CameraVariation(ConfigModel):
 
     camera: Name = Field(description="Name of the camera.")
     position: Annotated[Vec3, Unit("m")] = Field(
-        (0.0, 0.0, 0.0), description="Largest offsets along x, y and z, in both directions."
+        (0.0, 0.0, 0.0), description="Largest offsets along the world's x, y and z axes, in both directions."
     )
     rotation: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest rotation, about a random axis.")
 

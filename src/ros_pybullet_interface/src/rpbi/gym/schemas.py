@@ -20,7 +20,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _of_task(name: str, schema: Schema) -> Schema:
-    kind = {"description": "The task.", "enum": [name]}
+    kind = {"description": "Type of the task.", "enum": [name]}
     return {
         **schema,
         "properties": {TYPE: kind, **schema["properties"]},

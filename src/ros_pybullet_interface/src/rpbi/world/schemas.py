@@ -52,7 +52,7 @@ def file_schemas() -> dict[str, Schema]:
         if section == OWN_TYPES:
             files[kind_of(section)] = _of_any_type(file)
         elif types:
-            about = "Its type; as a rule that follows from the list of the main file and the other keys."
+            about = "Type of the object. By default, it follows from the list in the main file and from the other keys."
             file["properties"] = {**file["properties"], TYPE: {"description": about, "enum": [*types, None]}}
     return files
 

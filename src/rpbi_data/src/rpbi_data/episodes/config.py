@@ -44,10 +44,10 @@ class RecordParameters(ConfigModel):
         "to the last episode.",
     )
     start_button: Count | None = optional(
-        "Index of the `joy` button with the effect of `start_key`. By default, no button has it."
+        "Index of the `joy` button with the effect of `start_key`. By default, no button has this effect."
     )
     discard_button: Count | None = optional(
-        "Index of the `joy` button with the effect of `discard_key`. By default, no button has it."
+        "Index of the `joy` button with the effect of `discard_key`. By default, no button has this effect."
     )
     label_buttons: dict[_Index, str] = Field(
         {}, description="Labels, keyed by the index (as text) of the `joy` button that gives the label."

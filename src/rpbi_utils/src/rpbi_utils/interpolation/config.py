@@ -217,7 +217,7 @@ class InterpolationConfig(ConfigModel):
         "cubic", description="Shape of the curve between two waypoints."
     )
     time_origin: Literal["arrival", "ros_time"] = Field(
-        "arrival", description="Time to which the waypoints' times refer: their arrival, or 0 of ROS time."
+        "arrival", description="Time 0 of the waypoints: the arrival of their message, or 0 of ROS time."
     )
     limits: MotionLimitsConfig = Field(MotionLimitsConfig(), description="Limits of speeds and accelerations.")
     hold: Switch = Field(False, description="Whether the last target is published repeatedly after the last waypoint.")

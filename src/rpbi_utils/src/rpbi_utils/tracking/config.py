@@ -81,7 +81,7 @@ class TrackingNodeConfig(ConfigModel):
 
     frame_id: FrameId = Field("rpbi/world", description="TF frame in which poses are smoothed and broadcast.")
     timeout_s: Seconds = Field(
-        0.5, description="Time without a pose after which the object counts as lost, and is no longer broadcast."
+        0.5, description="Time without a pose after which an object counts as lost, and is no longer broadcast."
     )
     smoothing: SmoothingConfig = Field(SmoothingConfig(), description="Smoothing of poses.")
     outliers: OutlierConfig = Field(OutlierConfig(), description="Rejection of outliers.")

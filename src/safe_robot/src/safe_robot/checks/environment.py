@@ -24,13 +24,15 @@ class EnvironmentConfig(CheckConfig):
 
     margin_m: NonNegativeMetres = Field(0.02, description="Least distance between links and bodies [m].")
     timeout_s: Seconds = Field(
-        0.5, description="Largest age of a live body's pose. While a pose is older, no target is safe."
+        0.5,
+        description="Largest age of the pose of a live obstacle, such as one from rpbi/markers. While a pose is "
+        "older, no target is safe.",
     )
     geometry: Geometry = Field("hulls", description=GEOMETRY)
     world: Text | None = Field(
         None,
         description="Main YAML file of a world, whose bodies are obstacles at their start poses. By default, only "
-        "live bodies are obstacles.",
+        "live obstacles are used.",
     )
     robot: Text | None = Field(
         None,

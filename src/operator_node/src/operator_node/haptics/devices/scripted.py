@@ -22,9 +22,9 @@ class ScriptedConfig(HapticConfig):
         0.0, description="Resolution of each measured axis [m]; 0 means exact measurements."
     )
     seed: Count = Field(0, description="Seed of the random variation of the press.")
-    depth_m: Metres = Field(0.04, description="Depth of the press, which varies by about 15 % with the seed.")
+    depth_m: Metres = Field(0.04, description="Depth of the press; the depth varies by about 15 % with the seed.")
     hold_s: Positive = Field(
-        1.2, description="Time for which the hand stays pressed down [s], which varies by about 15 % with the seed."
+        1.2, description="Time for which the hand stays pressed down [s]; the time varies by about 15 % with the seed."
     )
     wait_s: NonNegative = Field(0.5, description="Time for which the hand stays up before and after the press [s].")
 

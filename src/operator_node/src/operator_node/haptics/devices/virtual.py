@@ -34,8 +34,8 @@ class VirtualConfig(HapticConfig):
     )
     returns: Switch = Field(
         False,
-        description="Whether the handle returns to the middle when it is released, so that it can command velocities "
-        "rather than positions.",
+        description="Whether the handle returns to the middle when it is released, for commands of velocities rather "
+        "than positions.",
     )
 
 

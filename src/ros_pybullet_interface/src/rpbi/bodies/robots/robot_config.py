@@ -131,8 +131,8 @@ class RobotConfig(BodyConfig):
     )
     target_buffer_s: NonNegative = Field(
         BUFFER_S,
-        description="Delay of the position targets of a stream, within which late targets do no harm; 0 applies each "
-        "target on arrival.",
+        description="Delay of streamed position targets, so that a target may arrive late by up to this time; 0 "
+        "applies each target on arrival.",
         json_schema_extra={"unit": "s"},
     )
     enforce_effort_limits: Switch = Field(
@@ -170,11 +170,13 @@ class RobotConfig(BodyConfig):
     )
     joint_trajectory_controller: JointTrajectoryControllerConfig | None = Field(
         None,
-        description="Follower of joint trajectories; `{}` selects its defaults. By default, the robot does not "
+        description="Follower of joint trajectories; `{}` selects the defaults. By default, the robot does not "
         "accept trajectories.",
     )
     object_tf: ObjectTf | None = Field(
-        None, description="TF frame that a fixed or visual base follows. By default, the base does not follow a frame."
+        None,
+        description="TF frame that the base follows, if the base is fixed or the robot is visual. By default, the "
+        "base does not follow a frame.",
     )
     resetBaseVelocity: ResetBaseVelocity | None = Field(
         None, description="Start velocity of a base that is not fixed. By default, the base starts at rest."

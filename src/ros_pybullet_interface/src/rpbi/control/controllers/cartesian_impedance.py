@@ -58,7 +58,7 @@ class CartesianImpedanceConfig(ControllerConfig):
     posture_stiffness: Annotated[NonNegative, Unit("N m/rad or N/m")] = Field(
         20.0,
         description="Stiffness with which joints are pulled to the posture at the start of the controller, as far as "
-        "the target of the point permits.",
+        "the target pose permits.",
     )
 
 

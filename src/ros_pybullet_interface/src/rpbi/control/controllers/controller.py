@@ -21,7 +21,7 @@ class ControllerConfig(ConfigModel):
     """Keys that every entry of a robot's `controllers` has; a controller adds its own keys in a subclass."""
 
     type: Text = Field(description="Type of the controller: a key of CONTROLLERS, or `module:Class`.")
-    active: Switch = Field(True, description="Whether the controller drives its joints from the start.")
+    active: Switch = Field(True, description="Whether the controller is active from the start of the world.")
     joints: ListOf[Text] | None = Field(
         None, description="Joints that the controller drives. By default, all driven joints of the robot."
     )

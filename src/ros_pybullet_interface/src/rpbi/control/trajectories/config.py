@@ -34,7 +34,7 @@ class TrajectoryConstraints(ConfigModel):
         0.0, description="Time after the end of the trajectory within which joints must reach the goal."
     )
     stopped_velocity_tolerance: SpeedTolerance = Field(
-        0.01, description="Speed below which a joint at its goal counts as stopped; 0 is no limit."
+        0.01, description="Largest speed at which a joint counts as stopped at its goal; 0 is no limit."
     )
 
     @model_validator(mode="before")

@@ -26,7 +26,7 @@ class LiftConfig(HandConfig):
     finger_step: PositiveMetres = Field(
         0.005, description="Largest change of the finger joints' positions in one action."
     )
-    height: PositiveMetres = Field(0.1, description="Height above its start at which the body counts as lifted.")
+    height: PositiveMetres = Field(0.1, description="Height above the body's start at which the body counts as lifted.")
 
 
 class LiftTask(HandTask):

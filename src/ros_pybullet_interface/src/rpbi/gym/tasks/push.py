@@ -21,10 +21,10 @@ class PushConfig(HandConfig):
 
     object: Name = Field(description="Name of the body that is pushed.")
     goal_low: Position = Field(
-        description="Lower corner of the region in which goals are drawn, in the world frame; its z is not used."
+        description="Lower corner of the region in which goals are drawn, in the world frame; z is not used."
     )
     goal_high: Position = Field(
-        description="Upper corner of the region in which goals are drawn, in the world frame; its z is not used."
+        description="Upper corner of the region in which goals are drawn, in the world frame; z is not used."
     )
     tolerance: PositiveMetres = Field(
         0.03, description="Distance of the body from the goal below which the goal counts as reached."

@@ -24,10 +24,10 @@ class WipeConfig(HandConfig):
 
     surface: Name = Field(description="Name of the body that is wiped.")
     spot_low: Position = Field(
-        description="Lower corner of the rectangle that must be wiped, in the world frame; its z is not used."
+        description="Lower corner of the rectangle that must be wiped, in the world frame; z is not used."
     )
     spot_high: Position = Field(
-        description="Upper corner of the rectangle that must be wiped, in the world frame; its z is not used."
+        description="Upper corner of the rectangle that must be wiped, in the world frame; z is not used."
     )
     cells: Annotated[int, Field(ge=1, le=100)] = Field(
         4, description="Number of cells along each side of the rectangle."

@@ -23,7 +23,7 @@ class OcclusionConfig(ConfigModel):
 
     share: Fraction = Field(description="Fraction of the time during which the object is hidden.")
     length_s: Seconds = Field(
-        0.5, description="Duration of the time intervals in each of which the object is either hidden or visible."
+        0.5, description="Length of time intervals; during each interval, the object is either hidden or visible."
     )
 
 
@@ -36,8 +36,8 @@ class TrackingSensorConfig(SensorConfig):
     )
     noise_m: Annotated[Deviation, Unit("m")] = Field(
         (0.0, 0.0, 0.0),
-        description="Standard deviation of the position noise along the axes of the reported pose, or one number for "
-        "all axes.",
+        description="Standard deviation of the position noise along x, y and z of the frame in which poses are "
+        "reported, or one number for all axes.",
     )
     noise_rad: Annotated[NonNegative, Unit("rad")] = Field(
         0.0, description="Standard deviation of the rotation noise about each axis."
