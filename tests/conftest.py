@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import os
 import resource
 import signal
@@ -29,6 +30,12 @@ from custom_ros_tools.ros.tf_interface import TfInterface  # noqa: E402
 
 pytest_plugins = ("work_plan", "run_report", "second_try")
 os.environ["PATH"] = path_with(WORKPLACE.folder / "bin")
+
+
+def pytest_collection_finish() -> None:
+    """Exempts the collected tests and imported modules from garbage collection, which takes time in every test."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary() -> None:
