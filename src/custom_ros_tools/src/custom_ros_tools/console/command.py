@@ -4,6 +4,7 @@ import argparse
 import inspect
 import re
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
@@ -96,7 +97,7 @@ class Command:
         self.name = function.__name__
         doc = f"{inspect.getdoc(function)}\n"
         sections = {match[1]: match[2] for match in _SECTION.finditer(doc)}
-        self._usage, self._args = (inspect.cleandoc(sections.get(name, "")) for name in ("Usage", "Args"))
+        self._usage, self._args = (textwrap.dedent(sections.get(name, "")).strip() for name in ("Usage", "Args"))
         self.summary, _, text = _SECTION.sub("", doc).partition("\n")
         self._text = text.strip("\n")
 
