@@ -44,10 +44,10 @@ class LinkPoseSample(NamedTuple):
 
 
 class BaseStateSample(NamedTuple):
-    """Pose and velocity of the base of a robot.
+    """Pose and velocity of a body's root link.
 
     Attributes:
-        name: Name of the robot.
+        name: Name of the body.
         frame: TF frame id of the root link.
         pose: Pose of the root link's URDF frame in the world frame.
         twist: Linear [m/s] and angular velocity [rad/s] of the root link's URDF frame, in the frame's own axes.

@@ -1,4 +1,4 @@
-"""Jitter buffer: schedules when each target of a stream is played."""
+"""Jitter buffer: schedules when each target of a stream is played, that is, when the set points reach the target."""
 
 from __future__ import annotations
 
@@ -48,10 +48,11 @@ class Playout(NamedTuple):
         start: Time [ticks] at which set points leave the previous target.
         end: Time [ticks] at which set points reach this target.
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
-        speed: Interval at which the previous target and this target were sent, divided by the interval at which the two
-            are played.
+        speed: Time between sending the previous target and sending this target, divided by the time between playing
+            the two targets.
         pace: Mean interval [ticks] between the arrivals of recent targets.
-        gap: Time [ticks] from the end of extrapolation to this target's arrival; 0 if the target came before that end.
+        gap: Time [ticks] from the end of the extrapolation beyond the previous target to this target's arrival; 0 if
+            this target came before that end.
         apart: Interval [ticks] from the previous target to this one, by stamps or arrivals; 0 if unknown.
     """
 
@@ -70,7 +71,7 @@ class Playout(NamedTuple):
 
 
 class JitterBuffer:
-    """Delays the targets of a stream such that they are played at the intervals at which they were sampled.
+    """Delays the targets of a stream such that set points reach them at the intervals at which they were sampled.
 
     Send times are estimated in two ways. The first estimate, for samples at irregular intervals, equals the stamps, or
     the arrivals if stamps are not valid. The second estimate, for regular samples that a busy machine sends late,
@@ -177,7 +178,7 @@ class JitterBuffer:
         return max(SHORTEST * self._pace / 2.0, SHORTEST_WAY) if self._end - tick > EVERY_TICK else SHORTEST_WAY
 
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
-        """Schedules the newest target as near to its planned time as the limits on delay changes permit.
+        """Schedules the newest target as near to `planned` as possible, since the delay may only change slowly.
 
         Args:
             tick: Number of the first tick after the target came.
@@ -308,9 +309,9 @@ def _rise(first: tuple[float, float], last: tuple[float, float]) -> float:
 
 
 def _misfit(times: Sequence[float], arrivals: Sequence[Arrival]) -> float:
-    """Returns the squared distance of the fourth target from the parabola through the first three, over time.
+    """Returns how far the last of four targets is from the parabola over time through the first three targets.
 
-    Returns infinity if the times of the first three targets do not increase.
+    The result is a squared distance; infinity if the times of the first three targets do not increase.
     """
     a, b, c, d = times
     if not a < b < c:

@@ -92,7 +92,7 @@ class JointDrive:
         """Ends the running motion, if there is one; the motion's joints hold their positions.
 
         Args:
-            reason: Reason for the message of the motion's result.
+            reason: Why the motion ends; becomes part of the message in the motion's result.
         """
         if self.motion is not None:
             measured = self.measured()

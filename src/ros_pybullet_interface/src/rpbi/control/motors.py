@@ -97,7 +97,8 @@ class ResolvedCommand(NamedTuple):
 def coalesce(older: tuple[ResolvedCommand, ...], newer: tuple[ResolvedCommand, ...]) -> tuple[ResolvedCommand, ...]:
     """Joins two sequences of targets.
 
-    If `older` has `MAX_WAITING_TARGETS` targets, merges the one target in `newer` into the last of these.
+    If `older` is full (`MAX_WAITING_TARGETS` targets), `newer` must hold one target, which is merged into the last
+    target of `older`.
     """
     if len(older) < MAX_WAITING_TARGETS:
         return older + newer

@@ -231,7 +231,7 @@ class TrackedBase(PoseFollower):
         self._timeout_ticks = math.ceil(object_tf.timeout_s / self._dt_s)
 
     def push(self, pose: Pose) -> None:
-        """Sets a new goal for the next tick, which moves the base to the goal at once if the pose is the first one."""
+        """Sets a new goal for the next tick. In that tick, the base jumps to the goal if the goal is the first one."""
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:

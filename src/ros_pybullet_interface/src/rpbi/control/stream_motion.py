@@ -152,7 +152,7 @@ class BoundedMotion:
 
     The plan's velocity jumps if targets come late. The set points then leave the plan and rejoin it with bounded
     accelerations. Otherwise set points equal the plan. The bound is computed from the targets and their mean period,
-    which delays hardly change. Decelerations may be larger if this is necessary to stop within `BRAKE_S`.
+    since delays hardly change the mean period. Decelerations may exceed the bound to stop within `BRAKE_S`.
 
     Args:
         held: Initial positions [rad or m], keyed by joint index.

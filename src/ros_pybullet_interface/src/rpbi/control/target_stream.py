@@ -134,8 +134,8 @@ class TargetStream:
     def advance(self, tick: float) -> Mapping[int, float]:
         """Advances the stream to a time [ticks], and returns the set points [rad or m], keyed by joint index.
 
-        Set points are clipped to the joints' limits if targets have velocities or accelerations are bounded. Otherwise
-        this is not needed, since set points lie between targets.
+        Set points are clipped to the joints' limits if the targets have velocities, or if the set points have bounded
+        accelerations. Otherwise set points lie between targets, so clipping is not needed.
         """
         segments = self._segments
         if segments and segments[-1].end <= tick and not segments[-1].is_beyond:

@@ -93,7 +93,7 @@ class TimedMotion(Motion):
         return all(abs(measured[index][1]) <= REST[self._model.joints[index].unit] for index in self._goal)
 
     def _residuals(self, measured: JointMotion, indices: list[int] | None = None) -> str:
-        """Returns position errors as text: of the joints in `indices`, or by default the largest in rad and in m."""
+        """Returns the errors of joints `indices` as text; by default, the largest error in rad and the largest in m."""
         errors = {index: abs(measured[index][0] - goal) for index, goal in self._goal.items()}
         joints = self._model.joints
         if indices is None:

@@ -97,7 +97,7 @@ class Schedule:
 
         Args:
             tick: The tick.
-            since: Previous tick that was checked, `tick - 1` if None. Work due after `since` and up to `tick` counts.
+            since: Previous tick that was checked, `tick - 1` if None. Checks all ticks after `since` up to `tick`.
         """
         return self._count(tick) > self._count(tick - 1 if since is None else since)
 

@@ -106,7 +106,8 @@ class SelectivelyDampedLeastSquares:
 def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Returns the step of m joints, shape (m,), with which the joints reduce an error of the link.
 
-    The limit of the step along a singular vector is lower if the step needs more joint motion.
+    The step is a sum of one step for each singular vector of the Jacobian. The limit of such a step is lower if more
+    joint motion is needed to move the link along the singular vector.
     """
     lengths = np.linalg.norm(jacobian, axis=0)  # motion of the link per unit motion of each joint
     step = np.zeros(jacobian.shape[1])

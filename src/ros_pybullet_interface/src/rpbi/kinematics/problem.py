@@ -96,8 +96,8 @@ class PybulletProblem:
     def narrowed(self, limits: Limits, joint_names: Sequence[str]) -> Limits:
         """Returns the intersection of given joint limits with the problem's limits.
 
-        As in PyBullet, the problem's limits are ignored for a joint without URDF limits if the lower limit is above the
-        upper limit.
+        If a joint has no URDF limits, and the problem's lower limit is above the problem's upper limit, both limits of
+        the problem are ignored, as in PyBullet.
 
         Args:
             limits: URDF limits of the n joints.

@@ -223,7 +223,7 @@ class RenderClient:
         """Logs a warning if the process has been silent for SILENT_AFTER_S, and another once messages arrive again.
 
         Args:
-            is_heard: Whether messages of the process have arrived since the last call; also true during its start.
+            is_heard: Whether messages have arrived since the last call; also true while the process starts.
         """
         now_s = time.monotonic()
         if is_heard:

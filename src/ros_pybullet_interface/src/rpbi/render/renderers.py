@@ -104,7 +104,7 @@ class Renderer(Protocol):
     pb: Client
 
     def make_room(self, intrinsics: Intrinsics) -> None:
-        """Prepares to draw images of a new camera's size."""
+        """Prepares to draw images for a new camera, which may need larger images than before."""
 
     def draw(
         self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()

@@ -23,7 +23,7 @@ An empty sequence means that the body does not have the topic or service."""
 
 
 class Answer(NamedTuple):
-    """Result of most service handlers; `serve` copies both values to the response's fields of the same names."""
+    """Result of most service handlers: `success` and `message`, which `serve` copies into the response."""
 
     success: bool
     message: str
@@ -50,7 +50,7 @@ class Topic(NamedTuple):
         meaning: Content of the topic or effect of a message, in a sentence, with the YAML key that sets the rate.
         key: Key in the main YAML file; the key opens the topic, or sets the topic's rate, where 0 is off. Empty if the
             topic is always open.
-        owners: Returns the names with which a body subscribes to the topic, see `Owners`.
+        owners: Function from a body to the texts that replace `{name}`, one for each topic that the body subscribes to.
         on_tf: For a sensor's topic whose samples also go to TF: converts a sample and its stamp [ns] to poses and
             their stamp [ns]. None for other topics.
     """
@@ -74,7 +74,7 @@ class Service(NamedTuple):
             response's fields. To refuse the request, the handler raises an InterfaceError or ValueError. The client
             then gets `success=False` and the error's message; if the response has no field `success`, the call fails.
             None if other code opens the service.
-        owners: Returns the names under which a body has the service, see `Owners`.
+        owners: Function from a body to the texts that replace `{name}`, one for each service that the body has.
     """
 
     name: str

@@ -122,7 +122,7 @@ def input_messages(world: World, slot: str, value: Any) -> Iterator[tuple[str, A
     Only joint targets and base velocities are converted; for other inputs, there are no pairs.
 
     Args:
-        world: The world, whose present stamp the messages of joint targets get.
+        world: The world. Messages of joint targets get the world's present stamp.
         slot: Body and name of the input, as `NAME/INPUT`.
         value: Value of the input, as it was applied to the world.
     """

@@ -87,7 +87,7 @@ def _wants_real_time_priority() -> bool:
 
 
 def parameter_above(name: str) -> Any:
-    """Returns a ROS parameter from the nearest namespace around the node that has the parameter, or else None."""
+    """Searches the node's namespaces, innermost first, for a ROS parameter; returns its value, or None if not found."""
     found = rospy.search_param(name)
     if found is None:
         return None

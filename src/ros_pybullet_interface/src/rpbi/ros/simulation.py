@@ -134,7 +134,7 @@ class Simulation:
             False if the world runs already.
 
         Raises:
-            InterfaceError: If the ticks of a request are running.
+            InterfaceError: If a request for ticks is still in progress.
         """
         if self.running:
             return False
@@ -145,7 +145,7 @@ class Simulation:
         return True
 
     def stop(self) -> bool:
-        """Stops a running world, aborts the ticks of a request, or aborts a restoration.
+        """Stops a running world, aborts a request for ticks, or aborts a restoration.
 
         All samples of the last tick are published. An aborted restoration resets the world.
 
@@ -173,7 +173,7 @@ class Simulation:
             Number and stamp [ns] of the new tick.
 
         Raises:
-            InterfaceError: If the world runs, or the ticks of a request are running.
+            InterfaceError: If the world runs, or a request for ticks is still in progress.
             PhysicsError: If a number in the world is no longer finite.
         """
         self._refuse_while_moving()
@@ -196,7 +196,7 @@ class Simulation:
             have been sent to the subscribers.
 
         Raises:
-            InterfaceError: If the world runs, or the ticks of another request are running.
+            InterfaceError: If the world runs, or another request for ticks is still in progress.
         """
         self._refuse_while_moving()
         request = StepRequest(steps)

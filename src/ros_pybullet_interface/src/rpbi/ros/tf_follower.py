@@ -108,9 +108,9 @@ class FollowedFrame:
         A period is `1 / pose_input.hz`. The look-up is due:
 
         - one period after the last look-up, if no transform of the frame has arrived since the last look-up;
-        - LOOK_UNTIL periods after the last look-up, if a transform has arrived less than LOOK_FROM periods after
-          the last look-up that found a new stamp;
-        - at the arrival of the transform, if the transform has arrived later than that.
+        - LOOK_UNTIL periods after the last look-up, if the transform arrived less than LOOK_FROM periods after the
+          last look-up that found a new stamp;
+        - at the transform's arrival, if the transform arrived at least LOOK_FROM periods after such a look-up.
 
         Args:
             came_s: Time [s] at which the frame's last transform arrived, on the monotonic clock.

@@ -44,7 +44,7 @@ class JointSprings(ConfigModel):
     )
 
     def by_joint(self, key: str, joints: Iterable[Joint]) -> Array:
-        """Returns the value of a key for each joint, shape (n,). Joints without a configured value get the default.
+        """Returns the stiffnesses or damping ratios of n joints, shape (n,): configured values or defaults.
 
         Args:
             key: `stiffness` or `damping_ratio`.
@@ -93,7 +93,7 @@ class Disturbance:
 
         Args:
             velocity: n velocities [rad/s or m/s] before the tick.
-            acceleration: n expected accelerations [rad/s^2 or m/s^2] during the tick, including the estimate.
+            acceleration: n expected accelerations [rad/s^2 or m/s^2] during the tick, including `estimate`.
         """
         self._predicted = velocity + self._dt_s * acceleration
 
@@ -149,7 +149,7 @@ def implicit(mass: Array, stiffness: Array, damping: Array, forces: Array, veloc
         mass: Mass matrix, shape (n, n).
         stiffness: n stiffnesses [N m/rad or N/m].
         damping: n dampings [N m s/rad or N s/m].
-        forces: n efforts [N m or N] at zero velocity, including the efforts of the springs.
+        forces: n efforts [N m or N] that would act if the joints were at rest: the springs' efforts plus all others.
         velocity: n velocities [rad/s or m/s] before the tick.
         dt_s: Length of the tick [s].
     """
@@ -168,9 +168,10 @@ def implicit_wrench(
         mobility: Mobility matrix of the point, J M^-1 J^T, shape (6, 6). It maps wrenches to accelerations.
         stiffness: 6 stiffnesses [N/m, N m/rad], along and about the axes of the springs.
         damping: 6 dampings [N s/m, N m s/rad], along and about the same axes.
-        wrench: Force [N] and moment [N m] at zero velocity, shape (6,): the springs' wrench plus additional pushes.
-        acceleration: Velocity of the point divided by the length of a tick, plus the point's acceleration due to
-            unmodelled effects [m/s^2, rad/s^2], shape (6,).
+        wrench: Force [N] and moment [N m] that would act if the point were at rest, shape (6,): the springs' wrench
+            plus additional pushes.
+        acceleration: Velocity [m/s, rad/s] that the point would have after the tick without any spring, damper or
+            push, divided by `dt_s`, shape (6,).
         dt_s: Length of the tick [s].
     """
     by_acceleration = (damping + stiffness * dt_s) * dt_s

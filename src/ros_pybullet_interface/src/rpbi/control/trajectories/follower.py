@@ -105,13 +105,13 @@ class TrajectoryFollower:
         return motion
 
     def cancel(self, reason: str, clock: Clock, motion: TrajectoryMotion | None = None) -> None:
-        """Ends the present motion: the joints stop within `stop_trajectory_duration` and hold.
+        """Replaces the present motion by one in which the joints stop within `stop_trajectory_duration` and hold.
 
         Args:
-            reason: Reason for the message of the motion's result.
+            reason: Why the motion is replaced; becomes the message in the replaced motion's result.
             clock: The world's clock.
-            motion: The motion to end; the call has no effect if another motion has replaced it. None ends the present
-                motion.
+            motion: Motion that must be the present one; if it is not, the call has no effect. None stops whatever
+                motion is present.
         """
         running = self._running
         if running is None or motion not in (None, running):

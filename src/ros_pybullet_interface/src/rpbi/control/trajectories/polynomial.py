@@ -74,7 +74,7 @@ def value_bounds(
 
     Args:
         polynomials: The n polynomials.
-        durations_s: n times [s]; each polynomial is bounded between 0 and its time.
+        durations_s: n durations [s]; the bounds of polynomial i hold for times from 0 to `durations_s[i]`.
 
     Returns:
         n lower bounds and n upper bounds.

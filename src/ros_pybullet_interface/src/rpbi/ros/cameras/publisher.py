@@ -46,7 +46,7 @@ class ScenePublisher:
         )
 
     def poll(self) -> None:
-        """Takes over added and removed cameras from the world, and exchanges messages with the renderer process.
+        """Updates the list of cameras from the world, and exchanges messages with the renderer process.
 
         Call this method in every pass of the simulation loop.
         """

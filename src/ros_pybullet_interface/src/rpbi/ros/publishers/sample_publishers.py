@@ -155,7 +155,7 @@ class TickPublisher:
     """Publishes the time of a tick on /clock, then the samples of the tick.
 
     Args:
-        idle_ticks: Number of ticks whose total length is the period between two calls of `publish_idle`.
+        idle_ticks: Period at which `publish_idle` is called, as a number of ticks.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:

@@ -163,7 +163,7 @@ class StatusPublisher:
 
         Args:
             running: Whether the world runs.
-            stepping: Whether the ticks of a request are running.
+            stepping: Whether the world advances by a number of ticks that a client requested.
             busy: Message for the diagnostics while a state is being restored, otherwise empty.
         """
         if self._rate.is_due():
@@ -270,7 +270,7 @@ class StatePublisher:
         """Publishes the state if a message is due by the wall clock, and measures the real-time factor.
 
         Args:
-            moves: Whether the world runs, or the ticks of a request are running.
+            moves: Whether the world runs, or advances by a number of ticks that a client requested.
         """
         now_s = time.monotonic()
         if moves != self._moves:

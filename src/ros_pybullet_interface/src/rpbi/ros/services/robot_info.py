@@ -23,7 +23,7 @@ from rpbi.world.loading import robots_description
 
 
 def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
-    """Returns a robot's joints with their limits, joints with force-torque sensors, and present joint state."""
+    """Returns a robot's joints and their limits, the names of joints with force-torque sensors, and the joint state."""
     robot: JointedBody = context.body
 
     def read() -> RobotInfoResponse:
