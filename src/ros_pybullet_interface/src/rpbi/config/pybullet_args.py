@@ -74,7 +74,7 @@ class Flags(Constants):
             given: Names as `"A|B"`, a number, or a list of names and numbers.
 
         Raises:
-            ValueError: If a name does not belong to the family, or a number is negative or 2^31 or larger.
+            ValueError: If a name does not belong to the family, or a number is not in the range from 0 to 2^31 - 1.
         """
         if isinstance(given, str):
             return _union(self._named(name.strip()) for name in given.split("|"))

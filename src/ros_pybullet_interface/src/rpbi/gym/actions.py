@@ -80,7 +80,8 @@ class PoseAction:
     effect.
 
     Args:
-        controller: Name, as `ROBOT/CONTROLLER`. The controller needs a `point` on the link, and a pose as its `target`.
+        controller: Name, as `ROBOT/CONTROLLER`. The controller's configuration must contain `point`, the controlled
+            point in the link's frame. The controller's input `target` must accept a pose.
         link: Name of the controlled link.
         low: Lower corner [m] of the target's box-shaped workspace, in the world frame.
         high: Upper corner [m] of the workspace, in the world frame.

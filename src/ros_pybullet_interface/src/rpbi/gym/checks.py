@@ -106,9 +106,9 @@ class CheckedTask:
 
 
 def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> list[str]:
-    """Checks whether a value is in a space.
+    """Compares a value with a space, and returns a message for each mismatch; empty if the value is in the space.
 
-    Returns a message for each entry of the value that is not, with the entry's key and its expected and actual value.
+    A message begins with `key`, followed by the keys that lead to the mismatch inside a dictionary.
     """
     if isinstance(space, spaces.Dict):
         if not isinstance(value, dict) or value.keys() != space.spaces.keys():

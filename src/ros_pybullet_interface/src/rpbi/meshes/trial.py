@@ -111,8 +111,8 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
     """Runs one trial process.
 
     Returns:
-        One message for each mesh that the process finished, and a message for the next mesh. The caller uses the last
-        message only if the process did not finish all meshes.
+        A list with one message for each mesh that the process finished, and a message for the first unfinished mesh.
+        The latter has no meaning if the process finished all meshes.
     """
     reading, writing = os.pipe()
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]

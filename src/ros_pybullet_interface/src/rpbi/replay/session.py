@@ -93,8 +93,8 @@ class Difference(NamedTuple):
     Attributes:
         checkpoint: The checkpoint.
         state_hash: Hash of the replayed state.
-        last_agreement: The last earlier checkpoint at which both states agreed, since the replay last began with a
-            built or reset world, or with a recorded keyframe. None without such a checkpoint.
+        last_agreement: The last checkpoint before `checkpoint` at which both states agreed. None if the states have not
+            agreed at a checkpoint since the replay last built or reset the world.
     """
 
     checkpoint: Checkpoint
@@ -125,9 +125,9 @@ class Replay:
     Args:
         recording: The recording to replay.
         progress: Function that is called at each checkpoint, with the number of ticks replayed since the last call.
-        observe: Function that is called after every tick, and whenever the replay begins with a built or reset world or
-            with a recorded keyframe. The arguments are the world, the number of resets so far in the recording, and the
-            sensor samples.
+        observe: Function that is called after every tick. It is also called after the replay has built or reset the
+            world and, if the part begins with a recorded keyframe, has set the world to this keyframe. The arguments
+            are the world, the number of resets so far in the recording, and the sensor samples.
 
     Raises:
         ConfigError: If the world cannot be built on this machine.
@@ -149,10 +149,10 @@ class Replay:
     def run(self, parts: Sequence[RecordedPart] | None = None) -> ReplayResult:
         """Replays parts of the recording up to the first difference, and returns the result.
 
-        A part that ends at a keyframe makes this keyframe again, and compares it with the recorded keyframe. The next
-        part then continues from the replayed state. All other parts begin with the built or reset world, or with their
-        recorded keyframe. Therefore different processes may replay different parts: if all parts agree, the whole
-        recording agrees.
+        At a keyframe that ends a part, the replay makes the keyframe again, and compares the new keyframe with the
+        recorded one. The next part then continues from the replayed state. All other parts begin with the built or
+        reset world, or with their recorded keyframe. Therefore different processes may replay different parts: if all
+        parts agree, the whole recording agrees.
 
         Args:
             parts: Consecutive parts of the recording; all parts by default.

@@ -226,7 +226,7 @@ class JointModel:
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: If lengths differ, a joint is named twice, or a value is not finite or too large.
+            ValueError: If lengths differ, a joint is named twice, or a value is too large or not finite.
         """
         if len(names) != len(values):
             raise ValueError(f"expected one value for each of the {len(names)} joints named, got {len(values)}")

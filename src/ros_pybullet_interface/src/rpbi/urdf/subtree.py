@@ -83,8 +83,9 @@ class Subtree:
     def contact_wrench(self, origin: Vector) -> tuple[Vector, Vector]:
         """Returns the total force [N] and moment [N m] that contacts exert on the subtree, in world axes.
 
-        Contacts with other links and bodies in the last step are counted, with normal and sliding friction forces.
-        PyBullet does not report rolling and spinning friction, nor contacts with soft bodies.
+        Sums the normal and sliding friction forces of the last step's contacts with other bodies, and with links of the
+        same body outside the subtree. PyBullet does not report rolling and spinning friction, nor contacts with soft
+        bodies.
 
         Args:
             origin: Reference point of the moment, in the world frame [m].

@@ -169,7 +169,7 @@ class WorldContents:
     def clear(self) -> None:
         """Removes attachments, bodies, scheduled sensors and all entries of the load log.
 
-        Cameras and inputs remain until `fill` or `rebuild` replaces them.
+        Keeps cameras and inputs; the next call of `fill` or `rebuild` updates them.
         """
         self.attachments.clear()
         for body in self.bodies.values():
@@ -181,10 +181,12 @@ class WorldContents:
         self.contacts.invalidate()
 
     def fill(self, loaded: LoadedWorld) -> None:
-        """Adds all configured objects, attachments and cameras. Existing cameras keep their present poses.
+        """Adds all configured objects, attachments and cameras, after `clear`.
+
+        Configured cameras that already exist keep their present poses. Other existing cameras are removed.
 
         Raises:
-            ConfigError: If objects, attachments or cameras cannot be added; all remaining ones are added.
+            ConfigError: If objects, attachments or cameras cannot be added; all others are added nevertheless.
         """
         inputs_before = self.inputs
         self._config = loaded.config

@@ -66,7 +66,7 @@ class LogEntry(NamedTuple):
     """A change of the bodies or the physics of a world; picklable.
 
     Attributes:
-        name: Name of the changed body; empty for `world` and `physics`.
+        name: Name of the changed body; empty if `what` is `world` or `physics`.
         what: Kind of the change: `world` (set-up), `physics`, `add`, `dynamics` or `remove`.
         arguments: For `world`, the WorldConfig. For `physics`, the PhysicsChange. For `add`, type and configuration of
             the body. For `dynamics`, link name (empty for the root link) and ChangeDynamics. For `remove`, None.

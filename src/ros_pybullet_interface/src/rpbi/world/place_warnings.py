@@ -123,7 +123,7 @@ def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _planes(world: World) -> Iterator[Problem]:
-    """Yields a warning for each plane on which bodies rest or will rest after a fall: contact points would be lost."""
+    """Yields a warning for each plane on which bodies rest or will rest, since PyBullet loses contacts with planes."""
     placed = [body for body in world.bodies.values() if _has_place(world, body)]
     for plane in placed:
         if _shape_kinds(plane) != {pybullet.GEOM_PLANE}:
@@ -212,7 +212,7 @@ class _Frames:
                 yield Problem(file_of(self._world, name), key, f"'{name}' follows it: {missing}")
 
     def _owner(self, frame: str) -> Body | None:
-        """Returns the body that a frame name `rpbi/BODY/...` refers to; None unless this body can publish frames."""
+        """Returns the body that a frame name `rpbi/BODY/...` refers to; None if this body cannot publish frames."""
         parts = frame.split("/")
         body = self._world.bodies.get(parts[1]) if len(parts) > 1 and parts[0] == "rpbi" else None
         can_publish = isinstance(body, JointedBody) or hasattr(getattr(body, "config", None), "broadcast_hz")
@@ -229,7 +229,7 @@ class _Frames:
         return frames
 
     def _missing(self, tf_id: str) -> str | None:
-        """Returns a message if this world does not publish a needed frame; otherwise None."""
+        """Returns a message if this world does not publish the frame `tf_id`; otherwise None."""
         frame = self._world.config.without_prefix(tf_id)
         missing = f"nothing here publishes the TF frame '{tf_id}'"
         if frame in self._published:

@@ -76,7 +76,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _of_any_type(schema: Schema) -> Schema:
-    """Extends the schema of object files by the required key `type`, and allows further keys for types to define."""
+    """Adds the required key `type` to the schema of object files, and allows further keys, which depend on the type."""
     known = {"type": "string", "enum": list(BODY_TYPES)}
     own = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
     kind = {"description": "Class of the object as `module:Class`, or the name of a type.", "anyOf": [own, known]}

@@ -140,7 +140,7 @@ class SensorSchedule:
 
     @property
     def idle_ticks(self) -> float:
-        """Number of ticks before the tick at which a sensor must next be called or read; inf if there is none."""
+        """Number of ticks that may pass before a sensor has to be called or read; inf if no sensor ever has to be."""
         if self.watching:
             return 0.0
         return self._queue[0][0] - self._clock.tick - 1 if self._queue else math.inf

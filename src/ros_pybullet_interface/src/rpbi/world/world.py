@@ -341,8 +341,8 @@ class World:
             name: Name of the body.
             what: Name of the action, a key of ACTIONS.
             value: Value for the action. Instead of a named tuple, a mapping of field names to values is accepted.
-            do: Function that is called with the body in place of the action. The function must have the same effect,
-                but may for instance use data prepared in another thread.
+            do: Function that is called with the body, instead of the action's own function. It must have the same
+                effect, but may for instance use data prepared in another thread.
 
         Returns:
             Result of the action.
@@ -370,8 +370,8 @@ class World:
 
         Args:
             slot: The input, as `NAME/INPUT`, such as `kuka_lwr/target`.
-            value: Value for the input. A joint target may be a mapping of joint names to numbers, and any other named
-                tuple a mapping of field names to values.
+            value: Value for the input. Instead of a joint target, a mapping of joint names to numbers is accepted.
+                Instead of any other named tuple, a mapping of field names to values is accepted.
 
         Raises:
             UnknownNameError: If there is no such input, or the value contains an unknown name.
@@ -401,7 +401,7 @@ class World:
     def frames(self) -> set[str]:
         """Returns the names of the TF frames that the world publishes, without the configured `tf_prefix`.
 
-        These are the world frame, the frames configured under `poses`, and the frames of sensors.
+        These are the world frame, the frames configured under `poses`, and the frames of the bodies' sensors.
         """
         poses = (pose.tf_id for pose in self.config.poses)
         sensors = (sensor for name in self.bodies for sensor in self.sensors_of(name))
@@ -538,7 +538,7 @@ class World:
 
     @_recorded
     def pause(self, reason: str) -> None:
-        """Aborts those running actions of the world's bodies that cannot be paused while the world is stopped.
+        """Aborts those running actions of bodies that could not be continued after a stop of the simulation.
 
         Args:
             reason: Reason that the aborted actions report.

@@ -83,7 +83,7 @@ def _masses(world: World) -> Iterator[Problem]:
 
 
 def _moving_no_mass(document: UrdfDocument) -> list[str]:
-    """Returns the names of the joints below which all links have mass 0."""
+    """Returns the names of all joints that are not fixed and below which all links have mass 0."""
     below = _joints_below(document)
 
     def is_massless(link: str) -> bool:
@@ -94,7 +94,7 @@ def _moving_no_mass(document: UrdfDocument) -> list[str]:
 
 
 def _joints_below(document: UrdfDocument) -> dict[str, list[Edge]]:
-    """Returns, for each link that is the parent of joints, these joints; indexed by the link's name."""
+    """Returns the child joints of each link, indexed by the link's name. Links without child joints are left out."""
     below: dict[str, list[Edge]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge)
@@ -204,8 +204,8 @@ def _start_angles(world: World, item: ObjectConfig, config: RobotConfig) -> Iter
 def _are_radians(angles: Sequence[float]) -> bool:
     """Returns whether angles that should be degrees look like radians.
 
-    All angles, taken as radians, must be within a half turn. In addition, at least one angle must be a multiple of 15
-    degrees (30 or more), or at least FRACTIONS of the angles must not be integers.
+    Two conditions must be met if the angles are taken as radians. All angles are within a half turn. In addition, an
+    angle of at least 30 degrees is a multiple of 15 degrees, or FRACTIONS or more angles are not integers.
     """
     if max(map(abs, angles), default=0.0) > HALF_TURN:
         return False
@@ -215,7 +215,7 @@ def _are_radians(angles: Sequence[float]) -> bool:
 
 
 def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> Iterator[Problem]:
-    """Yields a warning for a URDF's first `rpy` angle that looks like degrees, and for the first such joint limit."""
+    """Yields a warning for the first `rpy`, and one for the first joint limit, in a URDF that look like degrees."""
     key, expected = "loadURDF.fileName", "looks like degrees: expected [rad]"
     for owner, tag, name, text, _ in document.attributes():
         if (tag, name) == ("origin", "rpy") and any(FULL_TURN < abs(n) <= LARGEST_DEG for n in numbers_in(text)):

@@ -243,8 +243,8 @@ class Shadow:
     def restore(self, state: WorldState, commands: int) -> None:
         """Makes the shadow restore a state, without waiting for the result.
 
-        This is needed after the world has made a keyframe: the world then drops all earlier commands. The shadow cannot
-        reach the world's present state if it has not received some of these commands.
+        This is needed after the world has made a keyframe and dropped all earlier commands. A shadow that has not
+        received all of the dropped commands cannot reach the world's present state in another way.
 
         Args:
             state: Present state of the world.

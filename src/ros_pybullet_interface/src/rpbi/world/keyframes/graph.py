@@ -2,7 +2,7 @@
 
 The Python part of a world's state consists of the attributes of bodies, sensors, controllers and target streams. These
 attributes are written as a graph: repeated occurrences of an object are written as references to the first occurrence.
-Objects that exist in every world of the same build, such as bodies, are called anchors and referred to by name.
+Objects that the reading world also has, such as bodies, are called anchors and are written as their names only.
 Reading sets the attributes of existing objects, and creates the objects that a freshly built world does not have yet.
 The text contains class names, but no code, and only classes of trusted packages are instantiated.
 """
@@ -117,7 +117,7 @@ class GraphWriter:
     def attributes(self, value: Any, where: str) -> list[list[Any]]:
         """Returns each attribute of an object as a list of its name and its value as plain data.
 
-        Leaves out the attributes that `not_in_keyframes` of the object's class names.
+        Leaves out the attributes that are listed in the class attribute `not_in_keyframes`.
 
         Args:
             value: The object.
@@ -195,7 +195,8 @@ class GraphReader:
 
         Args:
             plain: Plain data from `GraphWriter.plain`.
-            here: Existing object whose attributes are set, or which the value replaces; NOTHING without such an object.
+            here: Existing value, which the caller replaces by the result; NOTHING without an existing value. If this
+                value is an object of the class that the plain data name, sets its attributes and returns the object.
 
         Raises:
             ValueError: If the plain data are not valid, or a class is missing or not trusted.
@@ -318,7 +319,7 @@ def _one_error() -> Iterator[None]:
 
 
 def _attribute(owner: Any, name: str) -> Any:
-    """Returns the value of an attribute that the object itself stores; NOTHING if the object does not store it."""
+    """Returns an attribute's value from the object's `__dict__` or slots; NOTHING if it is in neither."""
     if name in getattr(owner, "__dict__", ()):
         return vars(owner)[name]
     slots = (name in vars(kind).get("__slots__", ()) for kind in type(owner).__mro__)

@@ -93,7 +93,7 @@ class Keyframe:
 def _anchors(contents: WorldContents) -> dict[str, Any]:
     """Returns bodies, attachments and sensors, indexed by their names in keyframes.
 
-    Sensors come last, since they do not influence the motion.
+    Sensors come last, so that the text about bodies and attachments does not depend on sensors.
     """
     return {
         "bodies": contents.bodies,

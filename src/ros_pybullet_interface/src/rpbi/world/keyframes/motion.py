@@ -77,9 +77,10 @@ def _shape(values: Any) -> Any:
 
 
 def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
-    """Returns the names of the sleeping bodies: bodies that do not move in a simulation step with unusual gravity.
+    """Returns the names of the bodies that PyBullet has put to sleep.
 
-    The client must not be used afterwards, since the step changes the client's state.
+    Changes gravity and makes a simulation step: only sleeping bodies then stay where they are. The client must not be
+    used afterwards, since the step changes the client's state.
     """
     movable = {name: body for name, body in bodies.items() if _can_move(body)}
     before = {name: body.motion_state() for name, body in movable.items()}

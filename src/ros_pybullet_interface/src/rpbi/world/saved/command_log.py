@@ -26,8 +26,9 @@ class WorldCommand(NamedTuple):
 
     Attributes:
         tick: Tick of the world at which the command was applied: after the physics of this tick, before the next step.
-        name: Name of the body or camera that the command concerns; `NAME/LINK` for `dynamics` of a link, `NAME/INPUT`
-            for `input`, the attachment's name for `attach` and `detach`; empty for the whole world.
+        name: Name of the body or camera that the command concerns; empty for the whole world. If `what` is `dynamics`,
+            the name may be `NAME/LINK`. If `what` is `input`, the name is `NAME/INPUT`. If `what` is `attach` or
+            `detach`, the name is the attachment's name.
         what: Kind of the command: `input`, `add`, `add_camera`, `remove`, `dynamics`, `physics`, `sensor_rate`,
             `attach`, `detach`, `halt`, `pause`, `keyframe`, or a key of ACTIONS.
         value: Value of the command, whose type depends on the kind.
