@@ -53,7 +53,7 @@ def kill_with_children(process: subprocess.Popen) -> None:
 
 
 def is_stopped(process_id: int) -> bool:
-    """Returns whether a process is stopped by a signal, such as SIGSTOP; see proc_pid_stat(5)."""
+    """Returns whether a process is suspended by a signal, such as SIGSTOP; see proc_pid_stat(5)."""
     with contextlib.suppress(OSError):  # the process has just ended
         return Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()[0] == "T"
     return False

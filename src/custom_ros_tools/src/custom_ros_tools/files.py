@@ -19,8 +19,8 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
     Yields a temporary path to write to: the same file name in a hidden folder next to the file, which patterns such as
     `*.csv` do not match. At the end of the context, the written file replaces the old file. If the context raises an
-    error, the written file is removed, and the old file does not change. Symbolic links at both paths are replaced, not
-    followed.
+    error, the written file is removed, and the old file does not change. If `path` or the hidden folder is a symbolic
+    link, the link is replaced, not followed.
     """
     folder = path.with_name(f".{path.name}.part")
     if folder.is_symlink():

@@ -154,7 +154,7 @@ class RateParameters(ConfigModel):
 
 
 class RemappedJoint(ConfigModel):
-    """Conversion of a joint from the simulator to a driver: `sign * factor of the unit * position + offset`."""
+    """Conversion of a joint from the simulator to a driver, see `JointConversion`; `unit` determines the factor."""
 
     joint: Text = Field(description="Name of the joint in the simulator.")
     rename: Text | None = Field(

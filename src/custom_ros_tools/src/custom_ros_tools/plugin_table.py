@@ -30,8 +30,8 @@ class PluginTable(Mapping[str, type[Plugin]]):
 
     Args:
         kind: Noun for a plug-in in messages and documentation, such as `solver`.
-        base: Base class of the plug-ins, as `module:Class`. Users cannot select classes of the table that do not derive
-            from the base class; only other code uses these classes.
+        base: Base class of the plug-ins, as `module:Class`. The table may contain classes that do not derive from
+            the base class; users cannot select these classes.
         paths: `module:Class` of each plug-in, indexed by name.
         suggests: Whether the error message for an unknown name lists the known names.
     """
@@ -71,7 +71,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
             name: A name in the table, or `module:Class`.
 
         Raises:
-            UnknownNameError: If the name is not in the table, and the argument `suggests` was true.
+            UnknownNameError: If the name is not in the table. With `suggests=False`, a ValueError is raised instead.
             UntrustedError: If the class belongs to a package that must not be imported.
             ValueError: If `module:Class` does not exist or cannot be imported, or does not derive from `base`.
             MissingDependency: If the class needs a library that is not installed.

@@ -100,7 +100,7 @@ _unsent: dict[BufferedSocket, None] = {}
 
 
 def send_at_once() -> None:
-    """Flushes all sockets, and makes them send every later message at once. Call when the loop that flushes ends."""
+    """Flushes all sockets, and makes them send every later message at once, for use after a node's loop has ended."""
     _at_once.set()
     flush_buffered_sockets()
 
@@ -129,7 +129,7 @@ class ServerSocket:
     """A listening socket whose `accept` only returns connections whose TCPROS header has arrived.
 
     rospy reads the headers of all connections in one thread. So a client that does not send a header, for example a
-    stopped program, would block all other clients of the node forever. With this class, several connections wait for
+    suspended program, would block all other clients of the node forever. With this class, several connections wait for
     their headers in parallel. If the node does not have a free file handle, `accept` waits and raises a TimeoutError,
     after which rospy calls `accept` again. Other errors would end rospy's thread.
 

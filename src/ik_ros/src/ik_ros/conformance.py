@@ -44,7 +44,7 @@ class SolverConformance:
         options: Options of the solver. `forward` needs the keys `urdf_filename`, `base_link` and `tip_link`.
         least_share: Smallest fraction of reachable problems that the solver must solve.
         reachable_problems: Number of reachable problems.
-        random_problems: Number of problems whose targets may be unreachable. Solutions must be valid, but may fail.
+        random_problems: Number of problems whose targets may be unreachable. Solutions may have `success=False`.
         reach_m: Largest absolute coordinate of random target positions in the base frame [m].
     """
 
@@ -128,7 +128,7 @@ class SolverConformance:
     # --- The tests.
 
     def test_its_joints_and_limits_belong_together(self) -> None:
-        """Joint names are unique. Each joint has a lower limit up to its upper limit, and a positive velocity limit."""
+        """Joint names are unique. Lower limits do not exceed upper limits, and velocity limits are positive."""
         names, lower, upper = self.solver.joint_names, self.solver.lower, self.solver.upper
         assert names and len(set(names)) == len(names) == len(lower) == len(upper)
         assert all(low <= high for low, high in zip(lower, upper))
@@ -152,7 +152,7 @@ class SolverConformance:
         assert abs(angle - solution.orientation_error_rad) < 0.01, (angle, solution)
 
     def test_answers_to_random_problems_are_finite_and_within_limits(self) -> None:
-        """Solutions are finite and within the limits, even if targets are unreachable and starts outside the limits."""
+        """Solutions are finite and within the limits, even for unreachable targets and starts outside the limits."""
         generator = random.Random(2)
         for seed in range(int(os.environ.get(PROBLEMS, self.random_problems))):
             x, y, z = (generator.uniform(-self.reach_m, self.reach_m) for _ in range(3))

@@ -166,7 +166,7 @@ class ProblemStream:
     def _advance(
         self, continuity: JointRateLimiter, goal: tuple[float, ...], stamp_s: float
     ) -> tuple[tuple[float, ...], float]:
-        """Moves the target towards a goal. Returns the new target, and the fraction of the way that it covers."""
+        """Moves the target towards a goal. Returns the new target, and the covered fraction of the way to the goal."""
         positions, share = continuity.next(goal, self._period_s(stamp_s))
         self.target = tuple(positions.tolist())
         self._last = dict(zip(self._solver.joint_names, self.target))

@@ -214,7 +214,8 @@ class PathExecution(Execution):
         goal: Point where the path ends; None for a motion without goal.
 
     Attributes:
-        deviation: Current deviation from the path as the point, and its time derivative as the velocity, shape (dof,).
+        deviation: A `MotionState` that contains the current deviation from the path, shape (dof,), as the point, and
+            the deviation's time derivative, shape (dof,), as the velocity.
     """
 
     def __init__(

@@ -29,8 +29,8 @@ class Chain:
     Attributes:
         joints: All joints of the chain, fixed joints included, from the base to the tip.
         moving: The joints of the chain that are not fixed.
-        joint_names: Names of the n joints to solve for: the moving joints, where the followed joint replaces each mimic
-            joint.
+        joint_names: Names of the n joints to solve for: the moving joints, with each mimic joint replaced by the joint
+            that it follows.
         to_moving: The map from positions of the n joints to positions of the moving joints.
         limits: Limits of the n joints, narrowed so that mimic joints stay within their own limits.
         velocity_limits: Largest speeds of the n joints [rad/s or m/s]; inf for joints without a speed limit.
@@ -40,7 +40,9 @@ class Chain:
     Raises:
         ConfigError: If the file cannot be read, or a joint is invalid.
         UnknownNameError: If the robot does not have the link `base` or `tip`.
-        ValueError: If `base` is not an ancestor of `tip`, or if the chain has no moving joint or an unsuitable joint.
+        ValueError: If `base` is not an ancestor of `tip`, or the chain does not have a moving joint. Also if a joint
+            is of another type than revolute, continuous, prismatic or fixed, or if a mimic joint is unsuitable: it
+            follows a joint that does not move, or its limits leave no position.
     """
 
     def __init__(self, urdf_filename: str, base: str, tip: str) -> None:

@@ -78,9 +78,9 @@ class BackendConformance(ABC):
 
     @pytest.fixture
     def pairs(self, tmp_path: Path) -> list[tuple[RobotModel, Backend, list[int]]]:
-        """Returns a tuple for each robot: the `RobotModel`, the library's robot, and indices of joints.
+        """Returns a tuple for each robot: the `RobotModel`, the library's robot, and a list of indices.
 
-        The indices in the model's `joint_names` are in the order of the library's joints.
+        For each joint of the library's robot, the list has the joint's index in `RobotModel.joint_names`.
         """
         paths = list(self.robots)
         for name, text in (("skew", SKEW), *((("mimic", MIMIC),) if self.follows_mimics else ())):
@@ -101,7 +101,7 @@ class BackendConformance(ABC):
     def test_joints_and_their_limits_are_those_of_the_urdf(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """Joints and limits are those of `RobotModel`, without mimic joints and limits of continuous joints."""
+        """Joints and limits equal those of `RobotModel`: without mimic joints; continuous joints are unlimited."""
         for robot, backend, order in pairs:
             assert sorted(backend.joint_names) == sorted(robot.joint_names)
             expected = robot.limits.of(order)

@@ -141,6 +141,7 @@ class LinkFrames:
 
         A frame's pose in its parent frame is the sum of the frame's three `_parts`, each multiplied by the sine of an
         angle. The angles are pi/2 (sine 1), the joint position, and the joint position plus pi/2 (sine equals cosine).
+        For prismatic joints, the factor of the second part is the joint position itself, not its sine.
 
         Returns:
             Factors, shape (n, 3 * f), and offsets, shape (3 * f,).

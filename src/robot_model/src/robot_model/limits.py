@@ -39,7 +39,7 @@ class Limits:
         is_revolute: n flags, true for revolute and continuous joints.
 
     Attributes:
-        middle: n positions half-way between the limits. For a joint without both limits, the allowed position that is
+        middle: n positions half-way between the limits. For a joint that lacks a limit, the allowed position that is
             nearest to 0.
     """
 

@@ -1,8 +1,8 @@
 """Linear equations with symmetric positive definite matrices, such as mass matrices.
 
 For matrices of up to about 60 rows, the results are the same to the last bit with any number of LAPACK threads, unlike
-those of `numpy.linalg.solve` and `inv`. `solve` only takes one right-hand side, since on a busy machine, LAPACK's
-threads may wait for each other much longer than the computation takes.
+those of `numpy.linalg.solve` and `inv`. The function `solve` of this module takes a single right-hand side: for several
+right-hand sides, LAPACK would use several threads, which may wait long for each other on a busy machine.
 
 The functions do not check that a matrix is symmetric and positive definite. For other matrices, results are undefined.
 """

@@ -101,7 +101,7 @@ class RobotModel:
 
     @cached_property
     def telescopic(self) -> tuple[str, ...]:
-        """Names of the driven joints that move prismatic joints below driven revolute joints in the tree."""
+        """Names of the driven joints that move a prismatic joint beyond a moving revolute joint, seen from the root."""
         return tuple(dict.fromkeys(name for link in self.links for name in self._telescopic_to(link)))
 
     @cached_property
@@ -187,16 +187,16 @@ class RobotModel:
 
     @cached_property
     def _joint_motions(self) -> tuple[dict[str, Array], dict[str, float]]:
-        """Absolute values of the n factors and of the offset [rad or m] of each moving joint in the map of `map_to`.
+        """Absolute values of the map that `map_to` returns for all moving joints, as two dicts indexed by joint name.
 
-        The two dicts are indexed by joint name.
+        The first dict contains the n factors of each moving joint, the second dict the joint's offset [rad or m].
         """
         moving = [joint.name for joint in self.all_joints.values() if joint.is_moving]
         factors, offsets = self.map_to(moving)
         return dict(zip(moving, np.abs(factors))), dict(zip(moving, np.abs(offsets).tolist()))
 
     def _travel(self, name: str) -> float:
-        """Returns a joint's largest absolute position [rad or m] if driven joints exceed limits by `MAX_OUTSIDE`."""
+        """Returns a joint's largest absolute position [rad or m]; driven joints may exceed limits by `MAX_OUTSIDE`."""
         factors, offsets = self._joint_motions
         farthest = (max(abs(joint.lower), abs(joint.upper)) + MAX_OUTSIDE for joint in self.joints)
         travels = (factor * most for factor, most in zip(factors[name].tolist(), farthest) if factor)

@@ -113,7 +113,10 @@ class CommandedMotion:
 
     @cached_property
     def waypoints(self) -> np.ndarray:
-        """Indices of rows about `WAYPOINT_SPACING` apart, including the first and the last row."""
+        """Indices of selected rows, including the first and the last row.
+
+        Between successive selected rows, the path lengths of all joints add up to about `WAYPOINT_SPACING` [rad or m].
+        """
         travelled = self.travelled.sum(axis=1)
         marks = np.arange(WAYPOINT_SPACING, travelled[-1], WAYPOINT_SPACING)
         rows = np.searchsorted(travelled, marks).tolist()

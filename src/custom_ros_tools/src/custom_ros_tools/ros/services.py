@@ -15,7 +15,7 @@ Handler = Callable[[], tuple[bool, str]]
 
 
 class Toggle:
-    """Switches a function of a node on and off. Switching it to the state it already has fails. Thread-safe.
+    """Switches a function of a node on and off. Fails if the function is already in the requested state. Thread-safe.
 
     Args:
         name: Name of the function in messages.

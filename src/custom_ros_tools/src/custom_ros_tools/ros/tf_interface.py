@@ -29,8 +29,8 @@ POLL_S = 0.01
 class TfListener:
     """Checks transforms from /tf and /tf_static, and stores the valid transforms in a buffer.
 
-    `tf2_ros.TransformListener` does not check transforms. So some invalid transforms crash the process in tf2, and for
-    each of the others, tf2 prints two lines.
+    `tf2_ros.TransformListener` does not check transforms. Some invalid transforms would crash the process in tf2. For
+    every other invalid transform, tf2 would print two lines.
 
     Args:
         buffer: The buffer.

@@ -33,7 +33,10 @@ class Unit(_Keyword):
 
 
 class Expects(_Keyword):
-    """Description of the expected value, if the type says too little. For list items, describes the whole list."""
+    """Words that describe the expected value in error messages, for fields whose type does not say enough.
+
+    On the item type of a list, the words have to describe the whole list, since messages show them for the list.
+    """
 
     keyword = "expects"
 

@@ -132,7 +132,7 @@ def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) ->
 
 
 def _expected(wanted: Schema | None, depth: int = 0) -> str:
-    """Describes the expected value of a key, or the expected items of `depth` nested lists."""
+    """Describes the expected value of a key; with `depth` 1, the items of a list, with 2, the items of its items."""
     if wanted is None:
         return "another value"
     for _ in range(depth):

@@ -219,7 +219,7 @@ class SceneConfig(ElementConfig):
 
 
 class CostConfig(ElementConfig):
-    """A cost: the name of a task map, and the weights `Rho` and the goal of the map's values."""
+    """An XML element that makes a task map a cost: the map's name, its weights `Rho`, and the goal of its values."""
 
     Task: Text
     Rho: Numbers = ()

@@ -56,8 +56,8 @@ class TaskMap(ElementConfig):
     """Base class of task maps. A task map computes values from the configuration, and has a goal for these values.
 
     Attributes:
-        is_about_links: Whether the map concerns links or the centre of mass. Success may depend on the error of such
-            maps.
+        is_about_links: True for maps of link poses and of the centre of mass, False for maps of joints. Only errors of
+            maps with True can decide whether a solution counts as successful.
     """
 
     is_about_links: ClassVar[bool] = False
@@ -272,7 +272,7 @@ class JointPoseMap(TaskMap):
         return goal
 
     def reference(self, joints: Sequence[str], situation: Situation) -> JointPositions:
-        """Returns the positions by joint name to which the values of the map's goal are added [rad or m]."""
+        """Returns the reference positions by joint name [rad or m]. The map's goal is relative to these positions."""
         return dict(zip(joints, self.JointRef or (0.0,) * len(joints)))
 
 

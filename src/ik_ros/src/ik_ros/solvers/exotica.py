@@ -30,8 +30,8 @@ class ExoticaConfig(ConfigModel):
 
     Attributes:
         xml_filename: EXOTica's XML file, with one problem and its solver; `{package}/path` is resolved.
-        use_scipy_solver: Whether Rho itself weights a cost, as in EXOTica's SciPy solver, instead of the square of Rho.
-            If true, the file does not need to contain a solver.
+        use_scipy_solver: If true, the weight of a cost is Rho, as in EXOTica's SciPy solver, and the file does not need
+            to contain a solver. If false, the weight is the square of Rho.
         scipy_solver_method: Accepted for compatibility, without effect.
         tolerance_m: Largest position error of a link up to which a goal counts as met [m].
         tolerance_rad: Largest rotation error of a link up to which a goal counts as met [rad].
@@ -45,7 +45,7 @@ class ExoticaConfig(ConfigModel):
 
 
 class _Cost(NamedTuple):
-    """The cost of a task map.
+    """A cost in the form of tasks of the solver `tasks`, made from a task map and its `CostConfig`.
 
     Attributes:
         goal: Goal of the map in problems that do not set a goal for the map.
@@ -131,11 +131,11 @@ class ExoticaSolver(Solver):
         return self._solver.solve(dataclasses.replace(problem, goals=goals, previous=(), frames={}))
 
     def _costs_of(self, tasks: Sequence[CostConfig], key: str) -> Iterator[tuple[str, _Cost]]:
-        """Yields the name and the cost of each task map that has a cost.
+        """Converts the XML's cost elements. Yields for each element the name of the task map and the `_Cost`.
 
         Args:
-            tasks: The costs in the XML.
-            key: Key path of the costs in the XML, for error messages.
+            tasks: The cost elements.
+            key: Key path of the cost elements in the XML, for error messages.
         """
         seen = set()
         for task in tasks:

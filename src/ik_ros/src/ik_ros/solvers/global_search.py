@@ -18,9 +18,9 @@ class GlobalConfig(KdlConfig):
     """Options of the solver `global`.
 
     Attributes:
-        restarts: Number of random starts after the given start, even if a solution is found before. At most 15 with
-            tolerances or mimic joints, and at most 3 for targets beyond reach. The search also ends if the first 10
-            starts miss the target even without joint limits.
+        restarts: Number of random starts after the given start; a found solution does not end the search. At most 15
+            with tolerances or mimic joints, and at most 3 for targets beyond reach. The search ends early if the first
+            10 starts miss the target even without joint limits.
         rank_by: Quantity by which solutions are sorted. `distance_to_start` is the Euclidean distance of the joint
             positions from the start. `middle_of_limits` is the largest distance of a joint from the middle of its
             limits, divided by half the joint's range.

@@ -63,7 +63,9 @@ class Distance(Task):
         return shape.placement if shape.link_id is None else self.robot.frame(shape.link_id) * shape.placement
 
     def _along(self, shape: RobotShape, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Returns the gradient of a point's coordinate along a direction with respect to the m free components.
+        """Returns the derivatives of a point's coordinate along `direction` with respect to the m free components.
+
+        The free components are those of a velocity that the solver determines, see `PinocchioRobot.free`.
 
         Args:
             shape: The shape that the point is fixed to.

@@ -141,7 +141,7 @@ class GaussNewton:
         return Iterate(q, rows, beyond, merit, step)
 
     def _step(self, here: Iterate, damping: float) -> np.ndarray | None:
-        """Computes the next step of the free components, shape (m,); returns None if the quadratic program fails."""
+        """Computes the next step of the m components in `PinocchioRobot.free`; None if the quadratic program fails."""
         hessian = np.zeros((self._count, self._count))
         gradient = np.zeros(self._count)
         off = 0.0

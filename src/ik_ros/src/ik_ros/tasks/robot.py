@@ -168,8 +168,8 @@ class PinocchioRobot:
     def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
         """Makes a configuration from joint positions.
 
-        Those of the n joints that `positions` leaves out are at the middle of their limits. Other moving joints that
-        `positions` leaves out are at 0.
+        For joints that `positions` leaves out, uses defaults: the middle of the limits for the n joints, and 0 for all
+        other moving joints.
 
         Args:
             positions: Positions by joint name [rad or m]. Fixed and mimic joints are ignored.
@@ -204,7 +204,7 @@ class PinocchioRobot:
 
         Args:
             q: The configuration before the step.
-            step: Motion of the m free components, shape (m,) [rad or m].
+            step: Motion of the m components in `free`, shape (m,) [rad or m].
             lower: Lower limits of the n joints [rad or m].
             upper: Upper limits of the n joints [rad or m].
         """
@@ -226,7 +226,7 @@ class PinocchioRobot:
         return pin.updateFramePlacement(self.model, self.data, link_id)
 
     def jacobian(self, link_id: int) -> np.ndarray:
-        """Returns the matrix that maps the m free velocity components to a link's velocity, 6 x m.
+        """Returns the matrix that maps the m velocity components in `free` to a link's velocity, 6 x m.
 
         The link's velocity is in the link's axes, the first three rows linear, the last three angular. The
         configuration is the one set by `update`.
@@ -234,8 +234,11 @@ class PinocchioRobot:
         return self._of_free(pin.getFrameJacobian(self.model, self.data, link_id, pin.LOCAL))
 
     def com(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the centre of mass in the base frame, shape (3,) [m], and its derivatives with respect to the m free
-        components, 3 x m."""
+        """Returns the robot's centre of mass in the configuration q, and the centre's Jacobian, both in the base frame.
+
+        The centre has the shape (3,) [m]. The Jacobian, 3 x m, maps the m velocity components in `free` to the centre's
+        velocity.
+        """
         jacobian = self._of_free(pin.jacobianCenterOfMass(self.model, self.data, q))
         com, moving, still = self.data.com[0].copy(), self.data.mass[0], self.model.inertias[0]
         if still.mass:  # Pinocchio omits the mass of fixed links
@@ -244,7 +247,7 @@ class PinocchioRobot:
         return com, jacobian
 
     def joint_rows(self, indices: Sequence[int]) -> np.ndarray:
-        """Returns the k x m matrix that selects k joints' velocities from the m free components.
+        """Returns the k x m matrix that selects k joints' velocities from the m velocity components in `free`.
 
         Args:
             indices: Indices of the k joints in `joint_names`.

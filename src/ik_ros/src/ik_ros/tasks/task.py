@@ -52,7 +52,7 @@ class Linearization(NamedTuple):
 
     Attributes:
         values: k task values [m or rad].
-        jacobian: Derivatives of the values with respect to the m free components, k x m.
+        jacobian: Derivatives of the values with respect to the m components in `PinocchioRobot.free`, k x m.
         lower: k lower bounds; -inf for values without a lower bound.
         upper: k upper bounds; inf for values without an upper bound. If the task prescribes exact values, `upper` and
             `lower` are the same array object.

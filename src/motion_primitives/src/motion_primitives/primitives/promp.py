@@ -344,7 +344,7 @@ class ProMP(Primitive):
 
         Args:
             progress: m times, as fractions of the duration.
-            distribution: Distribution of the weights, such as `conditioned` returns. None: the learned distribution.
+            distribution: Distribution of the weights, such as a result of `conditioned`; by default the learned one.
         """
         k = len(self._basis.centers)
         covariance = (distribution or self.distribution).covariance.reshape(self._dof, k, self._dof, k)

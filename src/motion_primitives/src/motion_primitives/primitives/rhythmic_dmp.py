@@ -122,8 +122,8 @@ class RhythmicDMP(Primitive):
     The motion is a limit cycle, see Ijspeert 2013, equations 2.7 to 2.9.
 
     Attributes:
-        period_s: Period of motions that begin later [s]. Learning sets the value to the demonstrations' period.
-        amplitude: Amplitude of motions that begin later, as a multiple of the demonstrated amplitude.
+        period_s: Period of motions that `begin` returns from now on [s]. `learn` sets the demonstrations' period.
+        amplitude: Amplitude of motions that `begin` returns from now on, as a multiple of the demonstrated amplitude.
     """
 
     Config = RhythmicDMPConfig
@@ -135,7 +135,7 @@ class RhythmicDMP(Primitive):
 
     @property
     def period_s(self) -> float:
-        """Period of motions that begin later [s]."""
+        """Period of motions that `begin` returns from now on [s]."""
         return self._period_s
 
     @period_s.setter

@@ -86,8 +86,9 @@ class Contact(NamedTuple):
         direction: Unit vector along the line between the closest points. Its sign is arbitrary unless `is_exact`.
         first: The closest point on the first body [m].
         second: The closest point on the second body [m].
-        directions: Unit vectors along the line between the closest points, for each pair of shapes of the two bodies.
-        is_exact: Whether exact shapes were measured. If so, `direction` points from the second body to the first.
+        directions: For each pair of shapes of the two bodies, a unit vector along the line between the closest points.
+        is_exact: Whether the distance is that of the exact shapes, not of the hulls. If so, `direction` points from the
+            second body to the first.
     """
 
     distance: float
@@ -161,7 +162,7 @@ class LinkDistances:
     def solids(self, member: str | int) -> list[Solid]:
         """Returns solids that contain the shapes of a link or an obstacle.
 
-        The solids of a link are in the frame that `LinkFrames` gives the link. Those of an obstacle are in the root.
+        The solids of a link are in the frame that `LinkFrames` gives the link, those of an obstacle in the root frame.
 
         Args:
             member: Name of the link, or number of the obstacle.
@@ -200,8 +201,8 @@ class LinkDistances:
         Args:
             pair: Two links, or a link and the number of an obstacle.
             most_m: Largest distance that is measured [m].
-            within_m: Required distance [m], for exact geometry. If the hulls are nearer, the exact shapes are measured.
-                If the exact shapes are further apart than `within_m`, the returned distance is `within_m`.
+            within_m: Distance of the hulls [m] below which exact geometry is used, if enabled. If the exact shapes are
+                further apart than `within_m`, the returned distance is `within_m`.
 
         Returns:
             The contact; None if the distance exceeds `most_m`.
@@ -216,7 +217,11 @@ class LinkDistances:
         return self._exactly(pair, contact, within_m)
 
     def _exactly(self, pair: Pair, contact: Contact, within_m: float) -> Contact:
-        """Measures the exact shapes of a pair. Returns the hulls' contact if exact shapes are missing or intersect."""
+        """Returns the contact between the exact shapes of a pair, instead of `contact`, which is that of the hulls.
+
+        Returns `contact` itself if exact shapes are missing or intersect, and `contact` with the distance `within_m` if
+        the exact shapes are further apart than `within_m`.
+        """
         assert self._exact is not None
         pieces = [self.pieces(member) for member in pair]
         if not all(pieces):

@@ -14,9 +14,9 @@ class Separation:
     """Computes lower bounds on the distances of p pairs without measuring the distances.
 
     A pair is two links, or a link and an obstacle. The distance between two convex shapes is at least the gap between
-    them along any direction. Along the line between the closest points, the gap equals the distance. So a direction is
-    stored for each combination of a shape of the first member and a shape of the second member, in the frame of the
-    second shape. Before a direction is stored, the bound is -inf.
+    them along any direction. Along the line between the closest points, the gap equals the distance. `learn` stores
+    such a direction for each combination of a shape of the first member and a shape of the second member, in the frame
+    of the second shape. Before a direction is stored, the bound is -inf.
 
     Args:
         pairs: Shapes of the first member and shapes of the second member of each pair.

@@ -57,7 +57,7 @@ class Obstacle(NamedTuple):
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """The attributes other than name and pose. If they are equal, two obstacles have the same shape."""
+        """The attributes other than name and pose. Two obstacles with equal tuples have the same shape."""
         return self.kind, self.size, self.mesh_file, self.corners
 
     @property

@@ -81,7 +81,9 @@ def found_mesh(name: str, source: Path) -> Path:
 
 
 def mesh_file(mesh: str, source: Path) -> Path:
-    """Finds a mesh in its ROS package or relative to the URDF, or a `package://` mesh in the folders above the URDF.
+    """Finds a mesh in its ROS package, if its name begins with `package://`, or else relative to the URDF's folder.
+
+    A `package://` mesh that its package lacks is searched for in the URDF's folder and all folders above.
 
     Args:
         mesh: File name of the mesh, as written in the URDF.

@@ -157,7 +157,7 @@ def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
 
 
 def put_root_first(robot: Element) -> None:
-    """Moves the root link before all other links, without which PyBullet crashes with URDF_MAINTAIN_LINK_ORDER."""
+    """Moves the root link before all other links; in another order, URDF_MAINTAIN_LINK_ORDER crashes PyBullet."""
     children = {end_of(joint, "child") for joint in robot.findall("joint")}
     for root in [link for link in robot.findall("link") if link.get("name") not in children]:
         robot.remove(root)

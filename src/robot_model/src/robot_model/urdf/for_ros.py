@@ -71,7 +71,7 @@ def _for_ros(document: UrdfDocument) -> Element:
 
 
 def _with_existing_textures(mesh: Path) -> Path:
-    """Returns the path of a mesh without missing textures, which RViz would report as errors.
+    """Returns the path of a mesh that does not name missing textures, which RViz would report as errors.
 
     If an OBJ file names missing textures, the path is that of a copy in the cache, from whose materials the lines with
     missing textures are removed. Otherwise, returns the path of the mesh itself.

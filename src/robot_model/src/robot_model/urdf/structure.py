@@ -174,7 +174,7 @@ def _text_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _text_problem(attribute: Attribute) -> str:
-    """Returns the reason why PyBullet cannot safely copy an attribute's text to stack and log, or an empty text."""
+    """Returns why a text is unsafe for PyBullet, which copies it to its stack and log; empty for a safe text."""
     _, tag, key, text, _ = attribute
     longest = LONGEST_NAME if (tag, key) in _NAMES or key == "link" else LONGEST_TEXT
     if (size := len(text.encode())) > longest:

@@ -27,7 +27,7 @@ class TooNear(NamedTuple):
     Attributes:
         pair: Two links, or a link and an obstacle.
         distance: Distance between the shapes in the configuration in which the shapes are too near [m].
-        is_while_braking: Whether the shapes are too near during the braking; otherwise, at the command.
+        is_while_braking: True if the shapes are too near during the braking, False if already at the command.
     """
 
     pair: Pair
@@ -175,7 +175,7 @@ class Proximity:
     def _sparse(self, travelled: np.ndarray) -> np.ndarray:
         """Returns the indices of a few rows, including the first and the last of k rows.
 
-        The path between two of the returned rows is about twice the margin, or `LEAST_SPACING_M` if this is longer.
+        The path between successive returned rows is about twice the margin, or `LEAST_SPACING_M` if this is longer.
 
         Args:
             travelled: Path length up to each of the k rows, shape (k,) [m].

@@ -40,7 +40,7 @@ KIND_OF_MARKER: dict[int, ObstacleKind] = {
 class Measurements:
     """Receives and stores the newest joint states, wrenches and bodies of the environment.
 
-    A joint state may contain only some of the guarded joints, for instance of one of several arms. The newest position
+    A joint state may contain only some of the guarded joints, for instance those of one arm. The newest position
     of each joint is stored, and the age of the measurement is the largest age of these positions. A joint state without
     any guarded joint, or with non-finite values, is refused with a warning. Wrenches [N, N m] are kept in the frame of
     the sensor. A missing value has an infinite age.

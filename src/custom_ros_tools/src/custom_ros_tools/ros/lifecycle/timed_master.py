@@ -21,7 +21,10 @@ PORTS = range(22000, 32000)
 
 
 class TimedTransport(Transport):
-    """XML-RPC transport with the timeout `TIMEOUT_S`, since a stopped process accepts connections but never answers."""
+    """XML-RPC transport with a timeout [s].
+
+    A suspended process (SIGSTOP) still accepts connections but never answers, so a call could wait forever.
+    """
 
     def __init__(self, timeout_s: float) -> None:
         super().__init__()
