@@ -130,7 +130,7 @@ def find_class(name: str, base: type) -> Any:
 
 
 def full_name(thing: Any) -> str:
-    """Returns `module:name` of a class or function, as accepted by `find`; for other objects, of the object's class."""
+    """Returns `module:name`, as accepted by `find`, of a class or function, or of the class of any other object."""
     named = thing if hasattr(thing, "__qualname__") else type(thing)
     return f"{named.__module__}:{named.__qualname__}"
 

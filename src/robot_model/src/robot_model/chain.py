@@ -42,7 +42,7 @@ class Chain:
         UnknownNameError: If the robot does not have the link `base` or `tip`.
         ValueError: If `base` is not an ancestor of `tip`, or the chain does not have a moving joint. Also if a joint
             is of another type than revolute, continuous, prismatic or fixed, or if a mimic joint is unsuitable: it
-            follows a joint that does not move, or its limits leave no position.
+            follows a joint that does not move, or its limits exclude all positions of the followed joint.
     """
 
     def __init__(self, urdf_filename: str, base: str, tip: str) -> None:

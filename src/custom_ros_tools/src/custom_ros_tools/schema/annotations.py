@@ -53,7 +53,7 @@ class AlsoTakes:
 
 @dataclass(eq=False)
 class InnerProblemsError(ValueError):
-    """Faults that a validator found by validating a value with another model. The keys of `problems` are relative to
+    """A validator has validated a value with another model, and found faults. The keys of `problems` are relative to
     the value.
     """
 

@@ -43,7 +43,8 @@ class MapTask(NamedTuple):
         options: Options of the task, without name and weight.
         rho: EXOTica's weight of the task.
         goal: Function that computes the task's goal from the numbers of the map's goal; None for a task without goal.
-        on_link: Frame on a link that the task moves; None for tasks that do not concern a link's pose.
+        on_link: The frame that the task moves, and the link that it is attached to; None for tasks that do not concern
+            a link's pose.
     """
 
     options: dict[str, Any]

@@ -141,7 +141,7 @@ class TasksSolver(Solver):
             yield robot.with_positions(start, positions)
 
     def _on_anchor(self, q: np.ndarray) -> np.ndarray:
-        """Moves a floating base in a configuration so that the link of the first pose constraint is at its goal.
+        """Returns a configuration with the floating base moved so that the first pose constraint's link is at its goal.
 
         Without a pose constraint, the base gets the pose in the options. A fixed base does not change.
         """

@@ -58,7 +58,8 @@ def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: M
     """Returns the acceleration of a spring-damper that pulls a motion to its goal, shape (dof,) [m/s^2 or rad/s^2].
 
     Positions follow Ijspeert 2013, equation 2.1; orientations follow Ude 2014, equation 16. At first, the pull is weak
-    (Hoffmann 2009, equation 7), so that a goal other than the demonstrated goal does not cause a jump at the start.
+    (Hoffmann 2009, equation 7), so that the acceleration does not jump at the start, even if the goal is not the
+    demonstrated goal.
 
     Args:
         space: Space of the points.

@@ -101,7 +101,7 @@ class WeightDistribution(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A known point of a motion, or its known time derivative, on which a distribution is conditioned.
+    """A known point of a motion, or a known time derivative of a point, on which a distribution is conditioned.
 
     Attributes:
         subject: Name for error messages.

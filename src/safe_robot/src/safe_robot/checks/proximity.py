@@ -125,8 +125,8 @@ class Proximity:
     ) -> TooNear | None:
         """Returns one of s pairs that comes too near in the chosen rows; measures distances only where necessary.
 
-        In a trial, the pair and row with the smallest bound are measured next, since they are most likely too near.
-        Otherwise rows are measured in order, so that equal motions have equal answers.
+        If `motion.is_trial`, the pair and row with the smallest bound are measured next, since the pair is most likely
+        too near there. Otherwise rows are measured in order, so that equal motions have equal answers.
 
         Args:
             motion: The motion.
