@@ -120,7 +120,9 @@ _FLIP = np.array((1.0, -1.0, 1.0))
 
 
 def _hinges(relative: Array, last: Array) -> Array:
-    """Returns the hinge angles of all joints (22 x 3) [rad]. Prefers angles within the limits, without clipping.
+    """Returns the hinge angles of all joints (22 x 3) [rad].
+
+    If possible, chooses solutions within the limits. Other angles are returned without clipping.
 
     Args:
         relative: Orientation of each segment in its parent, as rotation matrices (22 x 3 x 3).
@@ -152,7 +154,14 @@ def _hinges(relative: Array, last: Array) -> Array:
 
 
 def _with_first(a: float, m: Array, sign: float, last: Array) -> Array:
-    """Returns the three hinge angles of one joint whose first hinge is held at the angle `a` [rad]."""
+    """Returns the three hinge angles of one joint whose first hinge is held at the angle `a` [rad].
+
+    Args:
+        a: Angle of the first hinge [rad].
+        m: Orientation of the joint's segment in its parent (3 x 3), permuted to the order of axes x, y, z.
+        sign: 1 if the order of the joint's axes is cyclic, otherwise -1.
+        last: The joint's last hinge angles (3) [rad], near which the result is chosen.
+    """
     c, s = math.cos(a), math.sin(a)
     row_1, row_2 = c * m[1] + sign * s * m[2], c * m[2] - sign * s * m[1]
     angles = np.array((a, math.atan2(sign * m[0, 2], row_2[2]), math.atan2(sign * row_1[0], row_1[1])))

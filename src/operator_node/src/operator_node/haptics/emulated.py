@@ -14,7 +14,9 @@ MAX_STEP_S = 0.05
 
 
 class Hand:
-    """A handle with a mass. A simulated hand pulls the handle to a goal, and the device applies a force.
+    """Simulates a hand that holds a device's handle. Hand and handle move together as one mass.
+
+    Two forces act on the mass: the hand pulls towards a goal like a spring and a damper, and the device adds its force.
 
     Args:
         mass: Mass of handle and hand [kg].

@@ -107,7 +107,7 @@ class LoopReport(NamedTuple):
 
 
 class Link:
-    """Sends and receives picklable objects over a connected socket that preserves messages (SOCK_SEQPACKET).
+    """Sends and receives picklable objects over a connected socket with message boundaries (SOCK_SEQPACKET).
 
     The kernel buffers some 200 unread messages; further messages are dropped. When a process ends for any reason, the
     kernel closes that process's end of the connection at once.

@@ -41,7 +41,7 @@ class LoopClient:
     Attributes:
         report: The newest report.
         ended: Event that is set when the device must not be opened again.
-        failure: Reason why the client does not restart the process any more; empty as long as it does.
+        failure: Reason why the client no longer restarts the process; empty while the client still restarts it.
     """
 
     def __init__(self, setup: Setup, on_report: Callable[[LoopReport], None], arguments: Sequence[str] = ()) -> None:

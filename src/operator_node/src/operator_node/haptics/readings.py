@@ -121,7 +121,10 @@ class ReadingCheck:
         self._moved = self._claimed = ZERO
 
     def _compare(self, displacement: Vector, velocity: Vector | None, dt_s: float) -> None:
-        """Compares the displacement over a time window with the integral of the measured velocity."""
+        """Compares the displacement over a time window with the integral of the measured velocity.
+
+        If they differ too much, stores the error that `checked` then raises.
+        """
         if velocity is None or self.has_moved:
             return
         if dt_s > GAP_S:  # the velocity during the gap is unknown

@@ -193,7 +193,13 @@ def _explanation(frame: SegmentFrame) -> str | None:
 
 
 def _unit(trunk_m: float) -> tuple[str, float] | None:
-    """Returns the unit that would make a trunk length plausible, and the factor from this unit to metres, or None."""
+    """Returns the unit in which an implausible trunk length is plausible, and the factor from this unit to metres.
+
+    Returns None if the length is not plausible in any of the units.
+
+    Args:
+        trunk_m: Received length of the trunk, taken as metres [m].
+    """
     for name, scale in (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)):
         if 0.35 <= trunk_m * scale <= 1.1:
             return name, scale

@@ -83,7 +83,7 @@ class Receiver:
 
     @property
     def refusals(self) -> dict[str, str]:
-        """Details of the newest refused datagram, keyed by reason."""
+        """For each reason, details of the newest datagram that was refused for this reason."""
         return self._decoder.refusals
 
     @property

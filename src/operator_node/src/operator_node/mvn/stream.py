@@ -67,7 +67,7 @@ class StreamDecoder:
             `frames`, the number of returned `SegmentFrame`s, and `skipped`, the number of missing samples between these
             frames. Samples are missing if they are lost or late, or if MVN streams at a lower rate than it measures.
         refused: Reasons of the newest refused datagrams, from `packets.REASONS`. The caller may clear this queue.
-        refusals: Details of the newest refusal, keyed by reason.
+        refusals: For each reason, details of the newest datagram that was refused for this reason.
         remarks: Descriptions of unusual data, keyed by subject. The caller may clear this dictionary.
     """
 

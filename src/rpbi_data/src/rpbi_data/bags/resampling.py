@@ -99,8 +99,8 @@ def resample(
             are replaced by NaN or None.
 
     Returns:
-        A table with the same columns, in which numbers are floats, and the last column `time_error` [s]. The time
-        error of a row is the largest time between the row and the nearest sample used for any of its values.
+        A table with the same columns, in which numbers are floats, and the last column `time_error` [s]. For each value
+        in a row, the error is the time between the row and the nearest sample used. `time_error` is the row's largest.
 
     Raises:
         UnknownNameError: If the method does not exist.

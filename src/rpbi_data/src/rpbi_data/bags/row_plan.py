@@ -19,7 +19,8 @@ class RowPlan(NamedTuple):
     """Mapping from messages with one layout to table rows.
 
     Attributes:
-        rows: Rows into which a message is converted, each as its columns. The column `STAMP` is the stamp of the row.
+        rows: Rows into which a message is converted. Each row is a dictionary with the location of each value in the
+            message, indexed by column name. The column `STAMP` is the stamp of the row.
         fixed: Spans of bytes. The plan is valid for all messages with the same bytes in these spans.
         notes: Log messages about content that is not in the table.
     """

@@ -41,7 +41,7 @@ class _Block(NamedTuple):
     """Messages with the same layout.
 
     Attributes:
-        rows: Rows into which a message is converted, each as its columns.
+        rows: Rows into which a message is converted, see `RowPlan.rows`.
         matrix: The n serialised messages, shape (n, size), uint8.
         indices: Indices of these messages in the batch, ascending, shape (n,).
     """

@@ -73,7 +73,7 @@ class Signal(NamedTuple):
 
     @property
     def begins_at_once(self) -> bool:
-        """Whether no row may precede this feature's first message; False for actions."""
+        """Whether rows may only begin when this feature's first message has arrived. False for actions."""
         return self.method not in (NEXT, PREVIOUS)
 
 

@@ -255,7 +255,10 @@ class SourceEpisode(ExportedEpisode):
                 raise DatasetError(self.bag, f"'{key}': the nearest message is {at}, more than --max-time-error")
 
     def _resampled(self, signal: Signal) -> tuple[Array, Array]:
-        """Returns the values of a feature, shape (n, columns), and the time error of each row, shape (n,) [s]."""
+        """Returns the values of a feature, shape (n, columns), and the time error of each row, shape (n,) [s].
+
+        The time error is explained in `rpbi_data.resample`. For actions, it is the time between row and command.
+        """
         if signal.feature.key == ACTION:
             end = self.times[0] + (2 * len(self.times) * PER_SECOND + self._schema.fps) // (2 * self._schema.fps)
             matrix, error = action_values(signal, self._tables, self.times, np.append(self.times[1:], end))

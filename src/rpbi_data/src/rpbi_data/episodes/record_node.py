@@ -399,7 +399,11 @@ def _do(action: Callable[[], str]) -> None:
 
 
 def _matcher(topics: tuple[str, ...] | str, also: tuple[str, ...]) -> Callable[[str], bool] | tuple[str, ...]:
-    """Returns the full names of the topics to record, or a function that decides whether a topic is recorded."""
+    """Returns the full names of the topics to record if `topics` is a tuple of names.
+
+    If `topics` is a regular expression, returns a function that returns whether to record a topic. The topics in `also`
+    are recorded in both cases.
+    """
     further = tuple(rospy.resolve_name(each) for each in also)
     if not isinstance(topics, str):
         return (*(rospy.resolve_name(each) for each in topics), *further)

@@ -83,7 +83,8 @@ class Arrangement:
     def settle(self, random: np.random.Generator) -> None:
         """Resets the world, lets the objects fall from random poses, and simulates until they are at rest.
 
-        Objects that are farther than twice the radius of the area from its middle count as at rest, even if they move.
+        An object whose distance from the area's middle exceeds twice the area's radius counts as at rest, even if the
+        object moves.
 
         Raises:
             InterfaceError: If the objects do not come to rest in any of `ATTEMPTS` attempts.
@@ -168,7 +169,10 @@ class Arrangement:
         return bool(self._world.pb.getClosestPoints(body.body_id, other.body_id, GAP_M))
 
     def _motion(self, name: str) -> float:
-        """Returns an object's speed divided by the speed below which it is at rest; 0 if it is far from the area."""
+        """Returns an object's speed divided by the speed below which objects count as at rest.
+
+        Returns 0 for an object far from the area.
+        """
         body = self._world.bodies[name]
         if np.linalg.norm(np.subtract(body.base_pose().position, self.middle)) > 2.0 * self._radius:
             return 0.0

@@ -44,7 +44,10 @@ class Poses(NamedTuple):
         return cls(numbers[:, :3], Rotation.from_quat(numbers[:, 3:]))
 
     def __matmul__(self, other: Poses) -> Poses:
-        """Converts poses `other`, relative to this frame, to poses relative to this frame's reference, at each time."""
+        """Composes the poses at each time.
+
+        If `self` has the poses of a frame A in a frame B, and `other` has poses in A, the result has these poses in B.
+        """
         return Poses(self.position + self.rotation.apply(other.position), self.rotation * other.rotation)
 
 

@@ -18,8 +18,9 @@ HZ = 50.0
 def wait_until_ready() -> None:
     """Waits for a message on the topic that `~ready` names. Returns at once if this parameter is empty or missing.
 
-    With a real robot, this is the topic of the commands for the robot's driver. The simulated arm must not move
-    before the first command, since the guard accepts a first target only at the robot's present position.
+    With a real robot, `~ready` names the topic with the commands for the robot's driver. The simulated arm must not
+    move before the first of these commands. The guard, a node that checks targets, accepts a first target only at the
+    real robot's present position.
     """
     topic = str(rospy.get_param("~ready", ""))
     if topic:

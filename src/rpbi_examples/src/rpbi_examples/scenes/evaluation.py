@@ -34,9 +34,9 @@ class SeedResult(NamedTuple):
     Attributes:
         seed: Seed of the episode.
         result: Result of the episode.
-        state_hash: Hash of the world's state at the end of the episode. Empty after an error of the world.
+        state_hash: Hash of the world's state at the end of the episode. Empty if the world raised an error.
         picture: Camera image at the end of a failed episode: uint8, shape (height, width, 3). None after a success, and
-            after an error of the world.
+            if the world raised an error.
     """
 
     seed: int
@@ -63,7 +63,7 @@ class SeedResult(NamedTuple):
 def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) -> Generator[SeedResult, None, None]:
     """Runs an episode of a scene with each seed, and yields the results in the order of arrival.
 
-    Closing the generator ends its processes. After an error of the world, the episode counts as failed, and the next
+    Closing the generator ends its processes. If the world raises an error, the episode counts as failed, and the next
     episode runs in a new world.
 
     Args:

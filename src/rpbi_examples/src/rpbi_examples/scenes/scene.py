@@ -388,5 +388,5 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
 
 
 def broken_off(scene: Scene, error: InterfaceError) -> SceneResult:
-    """Returns the result of an episode that ended with an error of the world. The reason is the error's message."""
+    """Returns the result of an episode that ended because the world raised `error`, whose message is the reason."""
     return SceneResult(False, 0, scene.of, scene.seen.time_s, {}, " ".join(str(error).split()))

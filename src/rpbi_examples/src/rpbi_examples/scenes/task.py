@@ -59,8 +59,9 @@ class SceneTaskConfig(WorldTaskConfig):
 
 
 class SceneTask(WorldTask):
-    """Task of a Gymnasium environment that runs a scene. Actions move the scene's robots. With the action None,
-    `run_scene` moves all robots with `Scene.act` instead.
+    """Task of a Gymnasium environment that runs a scene. An action moves the scene's robots.
+
+    The action None moves no robot. `run_scene` steps the environment with None, and moves all robots with `Scene.act`.
     """
 
     Config = SceneTaskConfig

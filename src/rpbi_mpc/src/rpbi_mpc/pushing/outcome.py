@@ -55,7 +55,10 @@ class PushOutcome(NamedTuple):
     face_m: float
 
     def fault(self, tolerance: ToleranceConfig) -> str:
-        """Returns a text about the errors beyond `tolerance` and the model's misfit. Empty without such errors."""
+        """Returns a text that names the errors larger than `tolerance`, followed by the model's misfit.
+
+        Empty if no error is larger than `tolerance`.
+        """
         faults = []
         if self.goal_m > tolerance.goal:
             faults.append(

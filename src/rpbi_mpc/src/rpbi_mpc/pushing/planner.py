@@ -40,7 +40,7 @@ class PushSituation(NamedTuple):
         """Returns the slider's reference poses.
 
         Args:
-            times_s: N times after the start of the first command [s].
+            times_s: Times since the start of the first command, shape (N,) [s].
 
         Returns:
             x, y and yaw, shape (N, 3) [m, m, rad]. The first yaw differs by at most half a turn from the slider's yaw.

@@ -35,7 +35,8 @@ class WeightsConfig(ConfigModel):
         sliding: Speed of sliding along the face [s^2/m^2].
         change: Difference between the force in the first step and the previous force [s^2/m^2].
         final: Factor by which the weights of the last state are multiplied.
-        complementarity: Penalty for inputs with which the contact neither sticks nor slides [s^2/m^2].
+        complementarity: Violation that the function `complementarity` returns: the contact slides although the force
+            is not at the edge of the friction cone [s^2/m^2].
     """
 
     position: NonNegative = Field(30000.0, description="Weight of the slider's distance from the path [1/m^2].")

@@ -39,7 +39,8 @@ class PushSamplingConfig(SamplingConfig):
     `pushing.program.weights`.
 
     Attributes:
-        forward: Largest speed of the pusher towards the face [m/s]. The largest speed away from the face is a fifth.
+        forward: Largest speed of the pusher towards the face [m/s]. The largest speed away from the face is a fifth of
+            `forward`.
         across: Largest speed of the pusher along the face [m/s].
         yaw: Weight of the difference between the slider's yaw and the direction of the path [1/rad^2]. The weight must
             be large: a box that leaves a straight path turns first, but turning hardly changes the distance from the
@@ -120,7 +121,7 @@ class _ScoredPushes:
         self.best_states = np.empty((0, 4))
 
     def on_the_table(self, commands: np.ndarray) -> np.ndarray:
-        """Rotates velocities from the slider's axes at the start to the table's axes [m/s]."""
+        """Rotates velocities from the slider's axes at the start of the plan to the table's axes [m/s]."""
         turned: np.ndarray = commands @ rotation(self.situation.scene.slider[2]).T
         return turned
 

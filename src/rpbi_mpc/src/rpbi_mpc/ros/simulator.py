@@ -75,7 +75,7 @@ class SteppedSimulator:
             candidates: Planned inputs of each candidate.
             ticks: Number of ticks to simulate.
             watch: Names of the bodies whose states are returned.
-            every: Number of ticks between two returned states.
+            every: Number of ticks between two returned states; 0 means 10.
             cost: Cost of a state, as `module:name`. Empty: without a cost.
 
         Raises:

@@ -38,7 +38,10 @@ class Rollouts(Protocol):
 
 
 class SamplingConfig(ConfigModel):
-    """Horizon, knots and sampler of a controller that simulates candidate plans."""
+    """Options of a controller that simulates candidate plans.
+
+    A plan consists of commands at a few times, the knots. The sampler draws the candidates.
+    """
 
     horizon: Seconds = Field(0.5, description="Duration of the simulated plans.")
     knots: Annotated[int, Field(ge=2)] = Field(

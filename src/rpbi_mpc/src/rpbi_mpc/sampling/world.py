@@ -69,12 +69,14 @@ def whole_ticks(duration_s: float, dt_s: float) -> int:
 
 
 class RolloutTicks(NamedTuple):
-    """Ticks and rows of a prediction in which n commands act one after the other.
+    """Timing of a prediction in which n commands act one after the other.
+
+    The prediction returns a row with the state after every `every` ticks.
 
     Attributes:
         starts: First tick of each command, shape (n,).
         total: Number of ticks in the prediction.
-        every: Number of ticks between two rows of the prediction.
+        every: Number of ticks between two rows.
         rows: Index of the row at the end of each command, shape (n,).
     """
 

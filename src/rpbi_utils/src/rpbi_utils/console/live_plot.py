@@ -20,7 +20,7 @@ def live_plot(
 
     Args:
         TOPIC/FIELD: a numeric field, or an array or part of the message, all of whose numbers are plotted; an array
-            element is selected by its index or joint name. The topic may appear later.
+            element is selected by its index or joint name. The topic need not exist yet.
         seconds: length of the visible time span [s], 0.5 to 120; default: 10
         out: folder for saved pictures and data; default: the current folder
 

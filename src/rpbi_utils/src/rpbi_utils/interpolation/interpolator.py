@@ -246,7 +246,8 @@ class Interpolator:
             waypoints: All waypoints.
             times_s: Times of all waypoints [s], which replace the times in `waypoints`.
             first: Index of the first waypoint to pass through.
-            after: Time at which the old plan ends [s], and the old plan. None: the plan begins at the first waypoint.
+            after: Time at which the new plan replaces the old plan [s], and the old plan. None: the new plan begins at
+                the first waypoint.
         """
         method = self._config.method if self._config.use_interpolation else "linear"
         scalars = _scalar_knots(waypoints, times_s, method)[first:]

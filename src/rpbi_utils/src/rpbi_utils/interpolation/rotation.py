@@ -1,7 +1,8 @@
 """Paths of orientations. Between two knots, the rotation vector relative to the first knot is a polynomial of time.
 
-With a rotation R(t) = exp(phi(t)) R0, the angular velocity in fixed axes is J(phi) phi', with the left Jacobian
-J(phi) = 1 + a [phi] + b [phi]^2, a = (1 - cos |phi|)/|phi|^2, b = (|phi| - sin |phi|)/|phi|^3. At phi = 0, J is 1.
+With a rotation R(t) = exp([phi(t)]) R0, the angular velocity in fixed axes is J(phi) phi'. [phi] is the matrix of the
+cross product with phi. J is the left Jacobian J(phi) = 1 + a [phi] + b [phi]^2 with a = (1 - cos |phi|)/|phi|^2 and
+b = (|phi| - sin |phi|)/|phi|^3. At phi = 0, J is the identity matrix.
 The polynomial phi(t) can meet any orientation, angular velocity and angular acceleration at both ends. The
 parametrization has no singular orientation as long as two knots are less than a full turn apart.
 """
@@ -172,14 +173,14 @@ def _vector(values: Sequence[float]) -> Vector:
 
 
 def _with_jacobian(phi: Vector, v: Vector) -> Vector:
-    """Returns J(phi) v."""
+    """Returns J(phi) v, where J is the left Jacobian in the module's docstring."""
     a, b, _, _ = _coefficients(norm(phi))
     once = cross(phi, v)
     return plus(v, plus(scaled(a, once), scaled(b, cross(phi, once))))
 
 
 def _without_jacobian(phi: Vector, v: Vector) -> Vector:
-    """Returns J(phi)^-1 v, for |phi| up to pi."""
+    """Returns J(phi)^-1 v, where J is the left Jacobian in the module's docstring, for |phi| up to pi."""
     angle = norm(phi)
     half = 0.5 * angle
     c = 1.0 / 12.0 if angle < SMALL_RAD else (1.0 - half * math.cos(half) / math.sin(half)) / angle**2
@@ -188,7 +189,7 @@ def _without_jacobian(phi: Vector, v: Vector) -> Vector:
 
 
 def _jacobian_rate(phi: Vector, rate: Vector) -> Vector:
-    """Returns (dJ(phi)/dt) phi', where phi' is `rate`."""
+    """Returns (dJ(phi)/dt) phi', where J is the left Jacobian in the module's docstring, and phi' is `rate`."""
     _, b, da, db = _coefficients(norm(phi))
     swing = dot(phi, rate)
     once = cross(phi, rate)
@@ -196,7 +197,7 @@ def _jacobian_rate(phi: Vector, rate: Vector) -> Vector:
 
 
 def _coefficients(angle: float) -> tuple[float, float, float, float]:
-    """Returns a, b, (da/dx)/x and (db/dx)/x, where x = |phi| is the angle [rad]."""
+    """Returns a and b of the left Jacobian, (da/dx)/x and (db/dx)/x, where x = |phi| is the angle [rad]."""
     square = angle * angle
     if angle < SMALL_RAD:
         return 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0, -1.0 / 12.0, -1.0 / 60.0

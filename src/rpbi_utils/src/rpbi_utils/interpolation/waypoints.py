@@ -33,7 +33,7 @@ class Waypoints(NamedTuple):
     quats_xyzw: tuple[Quaternion, ...] | None = None
 
     def slower(self, factor: float) -> Waypoints:
-        """Returns the waypoints with derivatives for a motion that takes `factor` times as long. Keeps the times."""
+        """Returns the waypoints with the derivatives of a motion that is `factor` times slower, but the same times."""
         rates = None if self.rates is None else self.rates / factor
         accelerations = None if self.accelerations is None else self.accelerations / factor**2
         return self._replace(rates=rates, accelerations=accelerations)

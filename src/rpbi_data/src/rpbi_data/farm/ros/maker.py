@@ -104,7 +104,7 @@ class EpisodeMaker:
 
 
 class _AnotherError(InterfaceError):
-    """Raised if the world or the policy differs from the job's. The argument names the world or the policy."""
+    """The world or the policy's file on this machine differs from that in the job. The argument names which of both."""
 
     def __str__(self) -> str:
         where = "another one here than where the farm was started"

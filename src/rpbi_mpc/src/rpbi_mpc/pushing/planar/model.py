@@ -86,7 +86,11 @@ class SliderConfig(ConfigModel):
 
 
 def load_of(contact: Any, normal: Any, tangential: Any, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns a contact force's load in the slider's frame: force x, y [m/s], and moment about the middle [m^2/s]."""
+    """Returns the load that a contact force exerts, in the slider's frame: force x, y [m/s], and moment [m^2/s].
+
+    As in the whole module, a force is expressed as the speed that it causes. The moment about the slider's middle is
+    such a force times a lever arm.
+    """
     return normal, tangential, -slider.face * tangential - contact * normal
 
 
@@ -99,7 +103,7 @@ def twist_of(load: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
 
 
 def load_for(twist: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns the load [m/s, m/s, m^2/s] under which the slider moves with a given twist. Inverse of `twist_of`."""
+    """Returns the load under which the slider moves with a given twist. Inverse of `twist_of`. Units: see `load_of`."""
     return twist[0], twist[1], twist[2] * slider.characteristic_length**2
 
 
@@ -125,10 +129,11 @@ def pusher_velocity(state: Vector, control: Vector, slider: SliderConfig) -> tup
 
 
 def complementarity(control: Vector, slider: SliderConfig) -> Any:
-    """Returns the violation of the contact modes by an input [m^2/s^2]; 0 if the contact correctly sticks or slides.
+    """Returns how much an input violates the contact's rule [m^2/s^2]; 0 if the input obeys the rule.
 
-    The contact slides to the left only at the left edge of the friction cone, and to the right only at the right edge.
-    Inside the cone, the violation is never negative. `PushingProgram` penalises the violation instead of requiring 0,
+    The rule: the contact slides to the left only if the force is at the left edge of the friction cone, and to the
+    right only if the force is at the right edge. For forces within the cone, the returned violation is never negative.
+    `PushingProgram` penalises the violation instead of requiring 0,
     similar to the relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar
     manipulation via trajectory optimization with complementarity constraints", ICRA 2022.
     """
@@ -172,7 +177,10 @@ def response(
 
 
 def _cos_sin(angle: Any) -> tuple[Any, Any]:
-    """Returns cosine and sine of an angle. Calls methods for CasADi symbols, since NumPy's functions cause warnings."""
+    """Returns cosine and sine of an angle.
+
+    Calls the methods of a CasADi symbol itself, since NumPy's functions would cause warnings.
+    """
     return (angle.cos(), angle.sin()) if hasattr(angle, "cos") else (np.cos(angle), np.sin(angle))
 
 

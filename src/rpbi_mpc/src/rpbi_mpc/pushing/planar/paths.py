@@ -90,7 +90,7 @@ class PushPath:
         """Returns the slider's reference poses x, y, yaw at given times, shape (N, 3) [m, m, rad].
 
         Args:
-            times_s: One time or N times since the start of the path [s]. Times outside the path are clipped.
+            times_s: Times since the start of the path, a number or shape (N,) [s]. Times outside the path are clipped.
         """
         along = np.clip(np.atleast_1d(np.asarray(times_s, dtype=float)) * self.speed, 0.0, self.length)
         columns = (self._points[:, 0], self._points[:, 1], self._yaws)
