@@ -220,7 +220,7 @@ class Body:
         """
 
     def detach(self, name: str | None = None) -> None:
-        """Detaches this body from another body, for instance before that body is removed; does nothing by default.
+        """Detaches this body from another body, for instance before the other is removed; does nothing by default.
 
         Args:
             name: Name of the other body; None to remove all attachments.

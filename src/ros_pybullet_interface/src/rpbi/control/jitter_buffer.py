@@ -84,8 +84,8 @@ class JitterBuffer:
 
     Args:
         dt_s: Length of a tick [s].
-        buffer_s: Buffer delay [s], including one and a half ticks for the wait until the next tick. A target that
-            arrives late by less than the buffer delay is still played on time. 0 plays targets as they come.
+        buffer_s: Buffer delay [s], of which one and a half ticks cover each target's wait for the next tick. A target
+            that arrives late by less than the buffer delay is still played on time. 0 plays targets as they come.
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
@@ -288,7 +288,7 @@ class JitterBuffer:
 
 
 def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Returns a line's slope: of all lines below all points, the line with the smallest mean distance to the points.
+    """Returns the slope of the line that is below all points and has the smallest mean distance to the points.
 
     This line is the best estimate if delays are never negative (Moon, Skelly, Towsley: Estimation and removal of clock
     skew from network delay measurements, INFOCOM 1999). The line contains the edge of the lower convex hull at the mean

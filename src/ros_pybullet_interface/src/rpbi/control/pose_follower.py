@@ -124,7 +124,7 @@ class PoseFollower:
     Args:
         name: Name of the body, for messages.
         body_id: PyBullet's id of the body.
-        centre: Pose of the base's centre of mass, which PyBullet moves, in the frame that follows the poses.
+        centre: Pose of the base's inertial frame, which PyBullet moves, in the frame that follows the poses.
         object_tf: Configuration of the stream: frame name, rate and maximum speeds.
     """
 

@@ -47,7 +47,7 @@ class StreamSegment(NamedTuple):
         return self.start + self.length
 
     def cut(self, tick: float) -> StreamSegment:
-        """Returns the part of the segment before a time [ticks]; its length is 0 if the time is before the segment."""
+        """Returns the part of the segment before a time [ticks]; the part has length 0 if the segment starts later."""
         length = max(tick - self.start, 0.0)
         basis = _hermite(length / self.length)
         way = {index: self.covered(index, basis) for index in self.way}

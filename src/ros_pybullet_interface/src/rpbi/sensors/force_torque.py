@@ -20,7 +20,7 @@ from .sensor import SensedBody, SensedWorld, Sensor
 
 
 class ForceTorqueSensor(Sensor):
-    """Measures the force that a joint transmits, and the moment that it transmits about its origin.
+    """Measures the force and the moment that a joint transmits; the moment is about the joint's origin.
 
     Force and moment are in the axes of the URDF frame of the joint's child link.
 

@@ -38,7 +38,7 @@ class CheckedRequest(NamedTuple):
 
 
 class TrajectoryFollower:
-    """Makes a robot follow trajectories. A new trajectory replaces the present one from the new one's start time on.
+    """Makes a robot follow trajectories. From its start time on, a new trajectory replaces the present trajectory.
 
     Attributes:
         joint_names: Names of the joints that the follower drives.
@@ -82,8 +82,8 @@ class TrajectoryFollower:
             feedback: Function that is called with the follower's state at `action_monitor_rate` while the motion lasts.
 
         Raises:
-            TrajectoryRefusedError: If all points are in the past, a joint cannot reach the trajectory's next
-                point in time, the control mode is torque control, or a controller drives a joint.
+            TrajectoryRefusedError: If all points are in the past, the motion to the trajectory's next point would
+                exceed a joint's limits, the control mode is torque control, or a controller drives a joint.
         """
         now_s = clock.time_s
         start_s = now_s + (request.stamp_ns - clock.stamp_ns) / NS_PER_S if request.stamp_ns else now_s

@@ -50,7 +50,7 @@ class JointTrajectory(NamedTuple):
             from_s: The world's time [s] of the transition, before this trajectory's last point.
 
         Raises:
-            TrajectoryRefusedError: If the joint cannot reach the next point in time within its limits.
+            TrajectoryRefusedError: If the motion to the next point would exceed the velocity or position limits.
         """
         before = current.sample(from_s)
         number = next(i for i, knot in enumerate(self.knots) if start_s + knot.time_s > from_s)

@@ -120,9 +120,9 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
 
 
 def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
-    """Sets joint targets as the topic `joint_states/target` does, and answers once the next tick will use them.
+    """Sets joint targets as the topic `joint_states/target` does; the next tick after the answer uses the targets.
 
-    Controllers that step the world need this service: a message on the topic could arrive after the next step.
+    Clients that step the world need this service: a message on the topic could arrive after the next step.
 
     Raises:
         ValueError: If a target is refused; the error has the reason.

@@ -39,7 +39,7 @@ SURFACE_M = 0.005
 
 
 class TagConfig(ConfigModel):
-    """A tag on a body; its frame has x to the right, y up and z towards the viewer."""
+    """A tag on a body; the tag's frame has x to the right, y up and z towards the viewer."""
 
     id: Count = Field(description="Number of the tag in its tag family.")
     size: PositiveMetres = Field(description="Side of the tag's black square.")

@@ -16,7 +16,7 @@ from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 
 
 class ViconConfig(TrackingSensorConfig):
-    """A Vicon segment (a rigid part with markers) of the body, which is the Vicon subject."""
+    """A Vicon segment (a rigid part with markers); the Vicon subject is the body that lists this sensor."""
 
     link: Text | None = optional("Link that is reported as the segment. By default, the root link.")
 
