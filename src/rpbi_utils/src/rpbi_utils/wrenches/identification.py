@@ -1,8 +1,8 @@
 """Identifies a payload's mass and centre of mass, and a sensor's offsets, from wrenches in several poses.
 
 At rest, the sensor reports f = f0 - m g and t = t0 + m c x (-g) = t0 + g x (m c), with gravity g and the centre of mass
-c in the sensor's axes. The forces determine the mass m and the offset f0. The torques determine the first moment m c and
-the offset t0. Both are linear least-squares problems.
+c in the sensor's axes. The forces determine the mass m and the offset f0. The torques determine the first moment m c
+and the offset t0. Both are linear least-squares problems.
 """
 
 from __future__ import annotations
