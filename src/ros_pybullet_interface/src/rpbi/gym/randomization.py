@@ -189,7 +189,7 @@ class Randomizer:
         return (*self._config.dynamics, *self._config.poses, *self._config.joints)
 
     def _check(self, file: str) -> None:
-        """Tries each variation once, and then resets the world."""
+        """Applies each variation of bodies once as a test, checks the names of cameras, and then resets the world."""
         problems = list(self._problems(file))
         self._world.reset()
         if problems:

@@ -71,7 +71,7 @@ def limit_resources(cpu_s: int) -> None:
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
-    """Tries those meshes that have not passed yet. Returns an error message for each mesh that PyBullet cannot load."""
+    """Tries the meshes that did not pass earlier. Returns an error message for each mesh that PyBullet cannot load."""
     faults: dict[Mesh, str] = {}
     unknown: dict[Mesh, Path] = {}
     for mesh in dict.fromkeys(meshes):

@@ -161,7 +161,7 @@ def _places(files: Mapping[str, Schema]) -> Places:
 
 
 def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> Iterator[tuple[str, Schema]]:
-    """Yields path and schema of each mapping at any depth inside a mapping, except mappings with files of their own.
+    """Yields path and schema of each mapping nested in a mapping, except mappings with a file of their own.
 
     Args:
         mapping: Schema of the outer mapping.

@@ -55,7 +55,8 @@ class Joint:
     def from_info(cls, info: Sequence) -> Joint:
         """Returns a joint from the result of PyBullet's `getJointInfo`.
 
-        Effort 0, velocity 0, and a lower limit that is not below the upper limit mean that there is no limit.
+        Effort 0 means no effort limit, and velocity 0 no speed limit. A lower position limit that is not below the
+        upper position limit means that the joint does not have position limits.
         """
         limited = info[8] < info[9]
         return cls(

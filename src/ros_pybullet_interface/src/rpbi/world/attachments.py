@@ -72,7 +72,7 @@ class _Attachment:
         return self.parent, self.child
 
     def force_and_torque(self, pb: Client) -> tuple[Vector, Vector]:
-        """Returns the force [N] and torque [N m] that acted on the parent body in the last step, in world axes."""
+        """Returns force [N] and torque [N m] on the parent at the attachment point in the last step, in world axes."""
         state = pb.getConstraintState(self.constraint)
         force: Vector = state[:3]
         if len(state) == 3:  # ball joint: PyBullet returns the force on the child

@@ -222,7 +222,7 @@ class _Reader:
             self._owner_of[name] = file
 
     def _search_paths(self) -> tuple[str, ...]:
-        """Returns the configured search paths that exist; other keys of the main file need not be valid."""
+        """Returns the configured search paths that exist, without checking other keys of the main file."""
         given = self._data.get("setAdditionalSearchPath")
         folders: list[str] = []
         for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():

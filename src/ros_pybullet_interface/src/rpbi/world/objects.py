@@ -60,8 +60,8 @@ def type_of(section: str, data: Any) -> str:
 
     Args:
         section: Key of the main file's list that contains the object, such as `robots`.
-        data: Content of the object's file. For content that is not a mapping, returns some type of the section; then
-            `load_object` fails.
+        data: Content of the object's file. If the content is not a mapping, returns any type of the section; the caller
+            then calls `load_object`, which reports the fault.
     """
     given = data.get(TYPE) if isinstance(data, Mapping) else None
     if given is not None or section == OWN_TYPES:

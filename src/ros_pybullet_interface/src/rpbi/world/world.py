@@ -866,7 +866,7 @@ class World:
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Fails the requests waiting in `mailbox`, ends the shadow, disconnects from PyBullet and closes all bodies."""
+        """Ends waiting requests with an error, ends the shadow, disconnects from PyBullet, and closes all bodies."""
         self.mailbox.close()
         self._end_shadow()
         try:

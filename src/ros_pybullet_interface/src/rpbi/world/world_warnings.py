@@ -215,7 +215,7 @@ def _are_radians(angles: Sequence[float]) -> bool:
 
 
 def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> Iterator[Problem]:
-    """Yields a warning for the first `rpy`, and one for the first joint limit, in a URDF that look like degrees."""
+    """Yields warnings for the first `rpy` angles and the first joint limits in a URDF that look like degrees."""
     key, expected = "loadURDF.fileName", "looks like degrees: expected [rad]"
     for owner, tag, name, text, _ in document.attributes():
         if (tag, name) == ("origin", "rpy") and any(FULL_TURN < abs(n) <= LARGEST_DEG for n in numbers_in(text)):
@@ -229,7 +229,7 @@ def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> It
 
 
 def _views(world: World) -> Iterator[Problem]:
-    """Yields a warning for each angle of a pose, and each camera's `fov`, that seems to be in the wrong unit."""
+    """Yields a warning for each `rpy` under `poses` that looks like degrees, and each `fov` that looks like radians."""
     main = world.loaded.file
     for index, pose in enumerate(world.config.poses):
         if pose.rpy is not None and max(map(abs, pose.rpy)) > FULL_TURN:

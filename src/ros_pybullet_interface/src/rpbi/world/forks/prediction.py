@@ -53,7 +53,7 @@ class Prediction(NamedTuple):
     """Result of a prediction, with n samples of the motion.
 
     Attributes:
-        cost: Sum of the costs after all ticks; inf if the prediction failed.
+        cost: Sum of the costs of the states after each tick; inf if the prediction failed.
         state_hash: Hash of the state at the end, see `World.state_hash`.
         ticks: Ticks of the samples, counted from the start of the prediction, shape (n,).
         poses: For each body, positions [m] and quaternions (x, y, z, w) of the base in the world frame, shape (n, 7).

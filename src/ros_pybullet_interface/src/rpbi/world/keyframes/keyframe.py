@@ -157,7 +157,7 @@ def _enter(motions: Mapping[str, BodyMotion], sleepers: tuple[str, ...], content
 
 
 def move(world: Any, contents: WorldContents, pushed: Iterable[str], fresh: FreshClient) -> str:
-    """Moves a running `World` into a fresh client, and returns the text of the keyframe.
+    """Moves a running `World` into a fresh client, and returns a keyframe of its present state as text.
 
     Args:
         world: The world.

@@ -80,8 +80,8 @@ class CommandLog:
         """Returns commands that are not compressed yet.
 
         Args:
-            index: Index of the first command, counted since the world was built or reset. If this command is compressed
-                already, the oldest command that is not compressed is the first.
+            index: Index of the first command to return, counted since the world was built or reset. If this command is
+                compressed already, the result begins with the oldest command that is not compressed.
             most: Maximum number of commands to return.
 
         Returns:
