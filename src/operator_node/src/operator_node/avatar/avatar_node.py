@@ -151,7 +151,7 @@ class AvatarNode:
                 rospy.logwarn("%s: %s; the avatar holds its last pose", rospy.resolve_name(SEGMENTS_TOPIC), silence)
 
     def _engage(self, _: object) -> TriggerResponse:
-        """Service callback that restarts the mapping from the avatar's present pose, with the next frame."""
+        """Service callback: the next motion-capture frame restarts the mapping from the avatar's present pose."""
         with self._lock:
             self._begins = True
         return TriggerResponse(True, "the avatar restarts with the next segments")

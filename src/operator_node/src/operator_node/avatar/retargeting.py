@@ -68,7 +68,7 @@ class Retargeting:
         self._turn, self._shift = np.eye(3), np.zeros(3)
 
     def begin(self, hinges: Array | None = None) -> None:
-        """Restarts the mapping with the next frame, for instance because another person follows.
+        """Restarts the mapping with the next motion-capture frame, for instance because another person takes over.
 
         Args:
             hinges: Present angles of the avatar's hinges (66) [rad]; None: the last computed angles.

@@ -71,7 +71,7 @@ class KeyTerminal:
             raise DeviceError("keyboard", f"its standard input is no terminal: {error}") from None
 
     def wait(self, timeout_s: float) -> None:
-        """Waits until a key is typed or its holding time ends, and records keys that were typed or released.
+        """Waits until a key is typed or a key's holding time ends, and records keys that were typed or released.
 
         Args:
             timeout_s: Longest time to wait [s].

@@ -85,7 +85,7 @@ class DeviceWindow:
         return ""
 
     def close(self) -> None:
-        """Closes the window; may be called once."""
+        """Closes the window; must not be called again."""
         with contextlib.suppress(tkinter.TclError):  # the window is destroyed already
             self._root.destroy()
         del self._root, self.canvas

@@ -127,7 +127,7 @@ class WalkingPerson:
         return self._start + radius * np.array((np.sin(angle), 1.0 - np.cos(angle), 0.0))
 
     def _footprint(self, number: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns position [m] and direction [rad] of the ankle while its foot is on the floor in a stride.
+        """Returns the ankle's position [m] and the foot's yaw [rad] while the foot is on the floor in a stride.
 
         Args:
             number: Index of the stride.
@@ -141,7 +141,7 @@ class WalkingPerson:
         return place + (0.0, 0.0, self._height_m * T_POSE["RightFoot"][2]), angle
 
     def _ankle(self, walking_s: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns position [m] and direction [rad] of an ankle at the time `walking_s` [s].
+        """Returns an ankle's position [m] and the foot's yaw [rad] at the time `walking_s` since the first step [s].
 
         For the other arguments see `_footprint`.
         """

@@ -30,7 +30,7 @@ class Clutch:
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
-        """Updates the clutch from the handle's position [m] and buttons. Returns whether this engaged the clutch."""
+        """Updates the clutch from the handle's position [m] and buttons. Returns True if this call engaged it."""
         is_held = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
         if is_held and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO

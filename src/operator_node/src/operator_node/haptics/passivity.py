@@ -11,7 +11,7 @@ MAX_DAMPING = 30.0
 class PassivityController:
     """Observes the energy that the user puts into the device, and reduces forces that would make the energy negative.
 
-    Observer: Between two samples, the device holds the last force F. The energy that enters the device is therefore
+    Observer: Between two samples, the device holds the last force. The energy that enters the device is therefore
     exactly minus the sum of the held forces times the displacements (J.-H. Ryu, Y. S. Kim and B. Hannaford, "Sampled-
     and continuous-time passivity and stability of virtual environments", IEEE Trans. Robotics 20(4), 2004).
 
@@ -25,9 +25,10 @@ class PassivityController:
     shortened such that the energy stays above `floor_j`.
 
     Resolution: Each measured position has an error of up to e, half the diagonal of a cube with edge `resolution_m`. A
-    measured displacement may therefore differ from v dt by another 4 e. Summation by parts shows two errors of the
-    energy: e times the last force, and e times each change of the force. The controller subtracts the second error from
-    the energy, and reserves the energy needed to release the force. The leak is then F (a dt^2 + 5 e).
+    measured displacement has an error of up to 2 e, and so has v dt, which is the previous measured displacement. Both
+    may therefore differ by another 4 e. Summation by parts shows two errors of the energy: e times the last force, and
+    e times each change of the force. The controller subtracts the second error from the energy, and reserves the energy
+    needed to release the force. The leak is then F (a dt^2 + 5 e).
 
     Allowance: The allowance is energy that the device may return beyond the energy that was put in. Without it, a tool
     pushed by another object cannot push a hand at rest, and a first touch feels weaker if the simulator lags. A refill

@@ -64,8 +64,9 @@ class BagWriter:
     def end(self) -> None:
         """Makes `run` write the received messages, close the bag, and return.
 
-        Signal handlers may call this method, since it does not take a lock. The method puts an item into the queue:
-        `SimpleQueue.get` of Python 3.11 may block forever if a signal interrupts it shortly before its timeout.
+        Signal handlers may call this method, since it does not take a lock. The method puts an item into the queue that
+        `run` reads. Otherwise, the call of `SimpleQueue.get` in `run` might never return: in Python 3.11, `get` may
+        block forever if a signal interrupts it shortly before its timeout.
         """
         self._is_ended = True
         self._arrivals.put(None)

@@ -136,7 +136,10 @@ def _brightness(images: Array) -> Array:
 
 
 def _order_of_colours(found: Array, exported: Array) -> list[str]:
-    """Returns which exported colours the frames show as red, green and blue; empty if no colours are swapped."""
+    """Returns the names of the exported colours that appear as red, green and blue in the frames.
+
+    For instance, `["blue", "green", "red"]` means that red and blue are swapped. Empty if colours are not swapped.
+    """
     rest = _mean_square(found - exported)
     if rest < MIN_COLOUR_DIFFERENCE:
         return []

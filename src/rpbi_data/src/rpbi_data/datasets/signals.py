@@ -84,7 +84,7 @@ class RowOptions(NamedTuple):
         state: Topics of `observation.state`; None to derive them from the names and types of the recorded topics.
         action: Topics of `action`; None to derive them.
         images: Topics of images; None for all images.
-        features: Wildcard patterns for the names of further observations, without `observation.`; None for all.
+        features: Wildcard patterns for further observations, named without `observation.`; None for all.
         end_effector: Frame of the end effector, such as `arm/tool`; empty for none.
         gripper: Names of the gripper's joints. They are a separate observation, and come last in actions.
         timing: NEXT: actions are the newest commands before the next row. PREVIOUS: the newest commands at the row.
@@ -242,7 +242,7 @@ def _contacts(tables: Tables, types: Mapping[str, str]) -> Iterator[Signal]:
 
 
 def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
-    """Yields the poses of all bodies, whose frames are children of the world frame and have no slash in their name."""
+    """Yields the poses of all bodies. The frames of bodies are those children of the world frame without a slash."""
     for name, table in _frames(tables, namespace).items():
         if "/" not in name:
             yield Signal(
@@ -265,7 +265,10 @@ def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Co
 
 
 def _frames(tables: Tables, namespace: str) -> dict[str, str]:
-    """Returns the table name of each child frame of the world frame, indexed by frame without prefix (`arm/tool`)."""
+    """Returns the name of each table that has the poses of a frame in the world frame.
+
+    The keys are the frames' names without prefix, such as `arm/tool`.
+    """
     prefix = f"{namespace.strip('/')}/rpbi/".lstrip("/")
     found = {}
     for table in tables:

@@ -67,8 +67,8 @@ def _camera(target: Array, distance: float, forward: Array) -> Camera:
 def _points(links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]) -> Array:
     """Returns points that the camera must see, shape (n, 3) [m].
 
-    These are the box corners of small shapes, and the point of each large shape's box that is nearest to the middle of
-    the small shapes. Shapes larger than `LARGE_M` are large.
+    For a small shape, these are the corners of its bounding box. For a large shape, this is the point of its bounding
+    box that is nearest to the middle of all small shapes. Shapes larger than `LARGE_M` are large.
     """
     corners = [each for link in links for each in _corners(link, meshes)]
     if not corners:

@@ -62,11 +62,11 @@ def wrench_arrows(topic: str, table: pd.DataFrame, frames: Frames) -> Arrows | s
 
 
 def force_panels(tables: Mapping[str, pd.DataFrame], start_s: float) -> dict[str, Mapping[str, pd.Series]]:
-    """Returns the lines of each plot of forces and torques over time since the start [s], indexed by plot title.
+    """Returns the lines of each plot of forces and torques over time, indexed by plot title.
 
     Args:
         tables: Tables of contacts and stamped wrenches, indexed by topic.
-        start_s: ROS time of the start [s].
+        start_s: ROS time at which the time of the plots is 0 [s].
     """
     found: dict[str, Mapping[str, pd.Series]] = {}
     for topic, table in tables.items():

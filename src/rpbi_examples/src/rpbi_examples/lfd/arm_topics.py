@@ -100,10 +100,10 @@ class Arm:
             raise InterfaceError(f"{subject} is out of reach: {answer.message}")
 
     def require_plan(self, plan: PushPlan) -> None:
-        """Checks that a plan stays within the position limits of teleoperation.
+        """Checks that a plan exceeds the position limits of teleoperation by at most `BEYOND_M`.
 
         Raises:
-            InterfaceError: If the plan exceeds the limits by more than `BEYOND_M`.
+            InterfaceError: If the plan exceeds the limits by more.
         """
         for axis, (lower, upper), column in zip("xy", self._limits, plan.places.T):
             if column.min() < lower - BEYOND_M or column.max() > upper + BEYOND_M:

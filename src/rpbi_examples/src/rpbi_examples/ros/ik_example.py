@@ -66,8 +66,11 @@ def _track(robot: str, solver: str, target: np.ndarray) -> None:
 
 
 def _draw_a_round(robot: str, start: np.ndarray) -> None:
-    """Plans one trajectory to the figure eight, whose pose is `start`, and once around the figure. Publishes the
-    trajectory to the robot's trajectory controller.
+    """Plans and publishes one trajectory, which leads to the figure eight and once around the figure.
+
+    Args:
+        robot: Name of the robot, whose trajectory controller receives the trajectory.
+        start: Pose of the figure's frame in the frame of the robot's base, shape (4, 4).
     """
     figure = FigureEight()
     times_s = figure.period_s / WAYPOINTS * np.arange(WAYPOINTS + 1)

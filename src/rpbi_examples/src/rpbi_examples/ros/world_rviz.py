@@ -24,8 +24,8 @@ CONFIG = "-d"
 def main() -> None:
     """Replaces this process with RViz. RViz receives this process's arguments, and displays for the running world.
 
-    Without a simulator that loaded a world from a file, RViz starts without these displays. The same holds if the file
-    is invalid; the simulator reports the error then.
+    RViz starts without these displays if no simulator runs, if the simulator's world was not loaded from a file, or if
+    this file is invalid. The simulator reports an invalid file.
     """
     arguments = sys.argv[1:]
     place = arguments.index(CONFIG) + 1

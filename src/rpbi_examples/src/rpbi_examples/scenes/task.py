@@ -92,7 +92,10 @@ class SceneTask(WorldTask):
         ]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of the base class, the poses of the scene's bodies, and `Scene.goal_numbers` as `goal`."""
+        """Yields the parts of an observation.
+
+        These are the base class's parts, the poses of the scene's bodies, and `Scene.goal_numbers` as `goal`.
+        """
         yield from super().parts()
         for name in self._kind.watch.bodies:
             yield pose_part(self.world, name, self.config.low, self.config.high)

@@ -35,8 +35,8 @@ class PushRollouts(Protocol):
 
 
 class PushSamplingConfig(SamplingConfig):
-    """Options of the planner `sampling`. The other weights of the cost are `position`, `contact` and `final` in
-    `pushing.program.weights`.
+    """Options of the planner `sampling`. The cost also has the weights `position`, `contact` and `final`, which are
+    taken from `pushing.program.weights`.
 
     Attributes:
         forward: Largest speed of the pusher towards the face [m/s]. The largest speed away from the face is a fifth of

@@ -221,7 +221,9 @@ def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generato
 
 
 def _recovered(errors: list[float], limit: float, loop: LoopConfig) -> float:
-    """Returns the time from the first error until the errors stay below a limit [s]. inf if the last error is above.
+    """Returns the time from the first entry of `errors` until all later errors are below a limit [s].
+
+    Returns inf if the last error is above the limit.
 
     Args:
         errors: Error in each cycle [m].

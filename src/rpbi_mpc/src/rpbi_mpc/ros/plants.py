@@ -163,7 +163,8 @@ class SteppedPlant(HandPlant):
     def _targets(self, velocities: np.ndarray, durations_s: np.ndarray) -> list[PlannedInput]:
         """Returns the joint targets for a sequence of hand velocities.
 
-        Inverse kinematics are solved at the end of each velocity. In between, joint positions change linearly.
+        Inverse kinematics are solved for the hand's position at the end of each velocity's duration. In between, joint
+        positions change linearly.
 
         Args:
             velocities: Velocities x, y of the hand, shape (n, 2) [m/s].

@@ -17,7 +17,7 @@ from rpbi_mpc.controller import Plant, Sensed
 
 
 class InputConfig(ConfigModel):
-    """World input that the controller commands, and limits of the commanded numbers."""
+    """Selects the input of the world that the controller commands, and limits the commanded numbers."""
 
     input: str = Field(description="Input of the world: NAME/INPUT, such as kuka_lwr/target.")
     names: ListOf[str] = Field(description="Joints, or fields of the input's value, that are commanded.")

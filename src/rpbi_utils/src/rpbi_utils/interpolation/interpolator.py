@@ -59,7 +59,7 @@ class Plan(NamedTuple):
         return Plan(self.scalars.spliced(new.scalars, at_s), path, (*kept, *(t for t in new.knots_s if t > at_s)))
 
     def since(self, time_s: float) -> Plan:
-        """Returns this plan without the waypoints before a time [s] and the segments that end before that time."""
+        """Returns this plan without the waypoints before a time [s], and without the segments that end before it."""
         path = None if self.path is None else self.path.since(time_s)
         return Plan(self.scalars.since(time_s), path, tuple(each for each in self.knots_s if each >= time_s))
 
@@ -120,8 +120,8 @@ class Interpolator:
         """Plans a motion through waypoints. The waypoints' times are on the same clock as `now_s` [s].
 
         Raises:
-            WaypointError: If all waypoints are in the past or too early to change a sample, or if the motion cannot
-                keep its limits. The old plan then remains in use.
+            WaypointError: If all waypoints are in the past, if all waypoints are before the first sample that may
+                change, or if the motion cannot keep its limits. The old plan then remains in use.
         """
         lead_s = self._own_s(now_s) - now_s
         now_s += lead_s
@@ -210,7 +210,9 @@ class Interpolator:
         first: int = 0,
         after: tuple[float, Plan] | None = None,
     ) -> tuple[Plan, Added]:
-        """Returns the plan of `_through`, slowed down until the plan keeps the limits, and the result for `add`.
+        """Returns the plan from `_through`, slowed down to keep the limits, and the value that `add` returns.
+
+        For the arguments, see `_through`.
 
         Raises:
             WaypointError: If the motion exceeds a limit, and slowing down is disabled or does not suffice.

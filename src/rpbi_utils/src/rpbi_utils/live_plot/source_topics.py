@@ -86,7 +86,10 @@ class FieldSource:
 
 
 class _Clock:
-    """Assigns a time to each sample: the message's stamp, or else the newest stamp plus the time since its arrival."""
+    """Assigns a time to each sample, which is the stamp of the sample's message.
+
+    For a message without a stamp, the time is the newest stamp plus the time since this stamp arrived.
+    """
 
     def __init__(self) -> None:
         self._stamp_s, self._at_s = 0.0, time.monotonic()

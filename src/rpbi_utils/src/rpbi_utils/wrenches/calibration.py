@@ -163,7 +163,12 @@ class WrenchCalibration:
         self.offset: Array | None = None if payload is None else payload.offset
 
     def zero(self, mean: Array, gravity: Vector | None) -> None:
-        """Sets the zero offset to the mean wrench of a sensor without contact, minus the payload's weight."""
+        """Sets the zero offset to the mean wrench of a sensor without contact, minus the payload's weight.
+
+        Args:
+            mean: Mean wrench [N, N m], shape (6,).
+            gravity: Gravity vector in the sensor's axes [m/s^2]; may be None without a payload.
+        """
         self.offset = mean - self._weight(gravity)
 
     def use(self, payload: PayloadConfig) -> None:

@@ -136,8 +136,8 @@ def _fit(factors: Array, values: Array) -> tuple[Array, Array, Array, float]:
 
     Returns:
         x, shape (P,); the standard deviations of x, shape (P,); the offset, shape (3,); the residual's root mean
-        square. The standard deviations are scaled by Student's distribution, so that x plus or minus two of them is a
-        95 % confidence interval.
+        square. The standard deviations are scaled by Student's distribution, so that x plus or minus two standard
+        deviations is a 95 % confidence interval.
     """
     count, _, parameters = factors.shape
     A = (factors - factors.mean(axis=0)).reshape(3 * count, parameters)

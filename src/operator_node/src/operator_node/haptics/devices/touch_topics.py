@@ -193,12 +193,12 @@ class TouchDevice(HapticDevice):
             self._newest = HapticReading(position, velocity, quat, self._buttons)
 
     def _on_state(self, message: OmniState) -> None:
-        """Stores a state of the driver `omni`, whose axes are x right, y forward, z up."""
+        """Stores a state from the driver type `omni`, whose axes are x right, y forward, z up."""
         v, unit_m = message.velocity, self.config.metres_per_unit
         self._put_pose(message.pose.position, message.pose.orientation, unit_m, scaled(unit_m, (v.y, -v.x, v.z)))
 
     def _on_pose(self, message: PoseStamped) -> None:
-        """Stores a pose of the driver `pose` [m], with axes x right, y forward, z up. The driver sends no velocity."""
+        """Stores a pose [m] from the driver type `pose`, which has axes x right, y forward, z up, and no velocity."""
         self._place = message.pose.position
         self._put_pose(message.pose.position, message.pose.orientation, 1.0, None)
 
@@ -210,7 +210,7 @@ class TouchDevice(HapticDevice):
         self._buttons = int(bool(message.grey_button)), int(bool(message.white_button))
 
     def _on_tf(self, message: TFMessage) -> None:
-        """Stores the handle's transform from the driver `touch_x`, with axes x right, y up, z towards the user."""
+        """Stores the handle's transform from the driver type `touch_x`: axes x right, y up, z towards the user."""
         for transform in message.transforms:
             if transform.child_frame_id.strip("/") == self.config.handle_frame:
                 p, q = transform.transform.translation, transform.transform.rotation

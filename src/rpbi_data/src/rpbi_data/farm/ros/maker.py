@@ -104,7 +104,7 @@ class EpisodeMaker:
 
 
 class _AnotherError(InterfaceError):
-    """The world or the policy's file on this machine differs from that in the job. The argument names which of both."""
+    """The world or the policy's file on this machine differs from that in the job. The argument names what differs."""
 
     def __str__(self) -> str:
         where = "another one here than where the farm was started"

@@ -133,9 +133,9 @@ def complementarity(control: Vector, slider: SliderConfig) -> Any:
 
     The rule: the contact slides to the left only if the force is at the left edge of the friction cone, and to the
     right only if the force is at the right edge. For forces within the cone, the returned violation is never negative.
-    `PushingProgram` penalises the violation instead of requiring 0,
-    similar to the relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar
-    manipulation via trajectory optimization with complementarity constraints", ICRA 2022.
+    `PushingProgram` penalises the violation instead of requiring 0, similar to the relaxed complementarity of J. Moura,
+    T. Stouraitis and S. Vijayakumar, "Non-prehensile planar manipulation via trajectory optimization with
+    complementarity constraints", ICRA 2022.
     """
     normal, tangential, left, right = _items(control)
     return (slider.friction * normal - tangential) * left + (slider.friction * normal + tangential) * right
@@ -179,7 +179,7 @@ def response(
 def _cos_sin(angle: Any) -> tuple[Any, Any]:
     """Returns cosine and sine of an angle.
 
-    Calls the methods of a CasADi symbol itself, since NumPy's functions would cause warnings.
+    For a CasADi symbol, calls the symbol's methods, since NumPy's functions would cause warnings.
     """
     return (angle.cos(), angle.sin()) if hasattr(angle, "cos") else (np.cos(angle), np.sin(angle))
 
