@@ -124,7 +124,7 @@ def schema_files(root: Path) -> dict[Path, str]:
 
 
 def _any_sampler() -> Schema:
-    """Returns the JSON schema for the options of any sampler: one of `SAMPLERS`, or a class of the user."""
+    """Returns the JSON schema for the options of any sampler: one of `SAMPLERS`, or a user-defined class."""
     own_type = {"type": "object", "properties": {"type": {"pattern": r"^[\w.]+:\w+$"}}, "required": ["type"]}
     known = [
         {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}

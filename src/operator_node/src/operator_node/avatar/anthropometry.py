@@ -148,7 +148,11 @@ def segment_offsets(height_m: float) -> Array:
 
 
 def measured_offsets(frame: SegmentFrame) -> Array:
-    """Returns the origin of each segment in its parent's frame (23 x 3) [m], from a measured frame in any pose."""
+    """Returns the origin of each segment in its parent's frame (23 x 3) [m].
+
+    Args:
+        frame: Motion-capture frame of the person, in any pose.
+    """
     offsets = np.zeros((len(SEGMENTS), 3))
     parents, children = BONES.T
     vectors = frame.positions[children] - frame.positions[parents]

@@ -35,7 +35,7 @@ class HandAxes:
         self._engaged = None
 
     def axes(self, frame: SegmentFrame) -> tuple[float, ...]:
-        """Returns the values of `AXES`, each in [-1, 1]. If the hands are disengaged, engages them and returns 0."""
+        """Returns the values of `AXES`, each in [-1, 1]. Disengaged hands are engaged; all values are then 0."""
         places = _places(frame)
         if self._engaged is None:
             lengths = np.linalg.norm(np.diff(frame.positions[_ARMS], axis=1), axis=2).sum(axis=1)

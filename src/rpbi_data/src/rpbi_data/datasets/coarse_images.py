@@ -168,7 +168,7 @@ def _frozen(found: Array, own: Array) -> Array:
 
 
 def _long_runs(is_so: Array, least: int) -> Array:
-    """Returns a mask of the runs of at least `least` successive true values."""
+    """Returns a mask that is true where `is_so` has at least `least` successive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_so, [False]]).astype(int)))
     found = np.zeros(len(is_so), bool)
     for start, stop in edges.reshape(-1, 2):

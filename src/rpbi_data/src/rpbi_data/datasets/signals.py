@@ -242,7 +242,7 @@ def _contacts(tables: Tables, types: Mapping[str, str]) -> Iterator[Signal]:
 
 
 def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
-    """Yields the poses of all bodies. The frames of bodies are those children of the world frame without a slash."""
+    """Yields the poses of all bodies, which are the child frames of the world frame without a slash in their names."""
     for name, table in _frames(tables, namespace).items():
         if "/" not in name:
             yield Signal(

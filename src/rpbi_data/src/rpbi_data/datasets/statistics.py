@@ -72,7 +72,10 @@ class ImageStatistics:
 
 
 def pooled(parts: list[dict[str, list[Any]]]) -> dict[str, list[Any]]:
-    """Combines image statistics of several episodes; quantiles are means of their quantiles, weighted by `count`."""
+    """Combines image statistics of several episodes.
+
+    Quantiles of the result are means of the episodes' quantiles, weighted by `count`.
+    """
     counts = np.array([part["count"][0] for part in parts], float)
     arrays = {name: np.array([part[name] for part in parts]) for name in parts[0] if name != "count"}
 

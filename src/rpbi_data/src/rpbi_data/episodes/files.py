@@ -172,7 +172,11 @@ def _is_plain(path: str) -> bool:
 
 
 def _described(description: str) -> dict[str, Any]:
-    """Parses a world's description; raises a ConfigError if the types of files or configurations are wrong."""
+    """Parses a world's description, and returns the parsed data.
+
+    Raises:
+        ConfigError: If an entry for files or configurations is missing or not text.
+    """
     data = load_foreign_json(description, "rpbi/world_description")
     try:
         texts = [*data["files"].items(), *data["descriptions"].items()]
@@ -196,7 +200,10 @@ def _package_folders() -> tuple[Path, ...]:
 
 
 def _is_main_file(path: str) -> bool:
-    """Returns whether a file is a world's main file: all keys are allowed, and at least one key defines objects."""
+    """Returns whether a file is a world's main file.
+
+    A main file has only keys that main files may have, and at least one key that defines objects.
+    """
     from rpbi.config.world import main_file_model  # loads the simulator, which readers of episodes do not need
     from rpbi.world.objects import object_sections
 

@@ -185,7 +185,11 @@ class RecordNode:
             return f"episode {self._episode.number} is being recorded: {len(topics)} topics"
 
     def stop(self) -> str:
-        """Ends the current episode, and returns a message for the user; raises an InterfaceError without an episode."""
+        """Ends the current episode, and returns a message for the user.
+
+        Raises:
+            InterfaceError: If no episode is being recorded.
+        """
         with self._lock:
             self._require_recording()
             self._simulator.wait_for_hash()

@@ -1,4 +1,4 @@
-"""Moves the learning arm through topics and services: to positions, by teleoperation, and along plans."""
+"""Moves the robot's arm through topics and services: to positions, by teleoperation, and along plans."""
 
 from __future__ import annotations
 

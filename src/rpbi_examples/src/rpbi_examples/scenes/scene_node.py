@@ -137,7 +137,7 @@ class SimulatorStage(Stage):
         return self._scene.seen.time_s / (time.monotonic() - self._begin_s)
 
     def state_hash(self) -> str:
-        """Asks the simulator for the hash of the world's state."""
+        """Returns the hash of the world's state, which the simulator computes."""
         return str(self._ask("rpbi/get_state_hash", GetStateHash).state_hash)
 
     def _step(self, ticks: int) -> Any:
