@@ -342,6 +342,7 @@ BREAKS = {
 """What to add to which files, so that a rule is broken; and what the message names."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
 def test_broken_rule_is_reported_with_its_file(rule, tmp_path):
     src = tmp_path / "src"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.thorough
 SUPPORT = Path(__file__).parent / "support/runs"
 SUITE = """
 import pathlib, pytest

@@ -28,9 +28,8 @@ def poses(listener, frame):
     return stamps_s, np.array([pose_matrix(each.transform) for each in own]).reshape(-1, 4, 4)
 
 
-@pytest.mark.parametrize(
-    "solver", [LEADING, *(pytest.param(each, marks=pytest.mark.thorough) for each in MORE_SOLVERS)]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("solver", [LEADING, *MORE_SOLVERS])
 def test_arm_tracks_the_figure(ros, solver):
     moving, still = ros.listen("/tf", TFMessage), ros.listen("/tf_static", TFMessage)
     real = RealRobot(ros) if solver == LEADING else None

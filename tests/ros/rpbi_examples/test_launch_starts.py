@@ -19,6 +19,7 @@ LAUNCH = Path(__file__).resolve().parents[3] / "src/rpbi_examples/launch"
 ARGUMENTS = {
     "basic_example_dual_iiwa": [],
     "basic_example_human_model": [],
+    "basic_example_kinova": [],
     "basic_example_nextage": [],
     "basic_example_panda": [],
     "basic_example_talos": [],
@@ -30,6 +31,7 @@ ARGUMENTS = {
     "handover": [],
     "human_interaction": ["device:=scripted", "output:={folder}"],
     "interpolation": [],
+    "kuka_lwr_ik_example": [],
     "lfd": ["operator:=joystick", "virtual:=true", "out:={folder}"],
     "pushing_mpc": [],
     "pybullet_objects_example": [],

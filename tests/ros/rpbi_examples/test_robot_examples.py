@@ -134,9 +134,8 @@ def test_panda_works_with_ros_tools_and_leads_a_real_one(ros, position):
         real.wait_until_moved()
 
 
-@pytest.mark.parametrize(
-    "robot", ["kinova", *(pytest.param(robot, marks=pytest.mark.thorough) for robot in ("talos", "nextage", "human"))]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("robot", ["kinova", "talos", "nextage", "human"])
 def test_joints_of_a_robot_swing_in_turn(ros, robot):
     launch(ros, f"basic_example_{'human_model' if robot == 'human' else robot}", real_time_factor=4)
     states = ros.listen(f"/rpbi/{robot}/joint_states", JointState)

@@ -186,13 +186,16 @@ def test_robot_backs_off_from_a_force_and_continues_afterwards(tmp_path):
     assert found.is_done
 
 
+@pytest.mark.thorough
 def test_without_a_limit_the_same_force_grows_beyond_it(tmp_path):
     """The negative control of the test before."""
     found = dress_pressed(tmp_path, 1e6, [ABOVE], as_a_thread)
     assert found.peak_n > 3.0 * SNAG_LIMIT_N and found.back_m < 0.005 and found.is_done
 
 
-@pytest.mark.parametrize("limit_n, backs_off", ((FORCE_LIMIT_N, True), (1e6, False)))
+@pytest.mark.parametrize(
+    "limit_n, backs_off", ((FORCE_LIMIT_N, True), pytest.param(1e6, False, marks=pytest.mark.thorough))
+)
 def test_squeeze_from_both_sides_is_detected_although_its_vectors_cancel(tmp_path, limit_n, backs_off):
     """With a limit beyond all, its negative control, the robot goes on as with a sum of vectors."""
     found = dress_pressed(tmp_path, limit_n, [LEFT, RIGHT], as_a_squeeze, longest_s=0.6)

@@ -122,7 +122,12 @@ def test_rospy_serves_others_meanwhile_and_by_itself_does_not(monkeypatch, is_me
         keep_accepting()
     is_heard = threading.Event()
     server = TCPROSServer()
-    server.service_connection_handler = lambda *_: is_heard.set()
+
+    def serve(connection: socket.socket, *_: object) -> None:
+        connection.close()  # else it is closed when the server's thread ends, in some later test
+        is_heard.set()
+
+    server.service_connection_handler = serve
     server.start_server()
     address = ("127.0.0.1", server.get_address()[1])
     asked = b"service=/a"

@@ -14,6 +14,8 @@ MESH_MARGIN_M = 1e-3
 COARSE_M = 2e-3
 """Corners of a mesh are kept until each other corner is at most this far from a line between two kept corners [m].
 The remaining distance is added to the radius of the balls."""
+BLOCK = 4096
+"""Number of corners whose distances are computed at once, which limits the memory for large meshes."""
 MAX_CORNERS = 48
 """Largest number of kept corners of a mesh, even if other corners are then further away than `COARSE_M`."""
 SIDES = 32
@@ -126,15 +128,18 @@ def few_balls(points: Sequence[Vector]) -> np.ndarray:
     away = np.linalg.norm(corners - corners[kept[0]], axis=1)
     while away.max() > COARSE_M and len(kept) < MAX_CORNERS:
         new = int(np.argmax(away))
-        for old in kept:
-            away = np.minimum(away, _from_line(corners, corners[old], corners[new]))
+        for first in range(0, len(corners), BLOCK):
+            block = slice(first, first + BLOCK)
+            away[block] = np.minimum(away[block], _from_lines(corners[block], corners[kept], corners[new]))
         kept.append(new)
     return np.column_stack((corners[kept], np.full(len(kept), away.max() + MESH_MARGIN_M)))
 
 
-def _from_line(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Returns the distances of v points from the line segment between `start` and `end`."""
-    way = end - start
-    share = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
-    distance: np.ndarray = np.linalg.norm(points - start - share[:, None] * way, axis=1)
-    return distance
+def _from_lines(points: np.ndarray, starts: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Returns the distance of each of v points from the nearest of the line segments from k `starts` to `end`."""
+    lines = end - starts
+    offsets = points - starts[:, None]
+    shares = np.einsum("kvi,ki->kv", offsets, lines) / np.einsum("ki,ki->k", lines, lines)[:, None]
+    offsets -= np.clip(shares, 0.0, 1.0)[..., None] * lines[:, None]
+    distances: np.ndarray = np.linalg.norm(offsets, axis=2).min(axis=0)
+    return distances
