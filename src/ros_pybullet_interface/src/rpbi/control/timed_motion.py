@@ -82,7 +82,7 @@ class TimedMotion(Motion):
         }
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends the motion before its goal. The message includes the positions reached."""
+        """Ends the motion before its goal. The message of the result gives the reason and the measured positions."""
         self.end(False, f"{reason} before the goal: {self._residuals(measured)}; {self._reached(measured)}")
 
     def _missed(self, measured: JointMotion) -> list[int]:

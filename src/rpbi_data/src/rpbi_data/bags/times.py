@@ -42,7 +42,7 @@ def to_nanoseconds(seconds: ArrayLike) -> Array:
 def resolution_ns(seconds: ArrayLike) -> int:
     """Returns the distance between neighbouring floats at the largest of the given times [ns].
 
-    The distance is rounded down: 0 for times up to 97 days, and 239 ns for wall times since 2004.
+    The distance is rounded up, but is 0 below 1 ns: 0 for times up to 97 days, and 239 ns for wall times since 2004.
     """
     distance = np.spacing(np.abs(np.asarray(seconds, float)).max(initial=0.0)) * 1e9
     return int(np.ceil(distance)) if distance > 1.0 else 0

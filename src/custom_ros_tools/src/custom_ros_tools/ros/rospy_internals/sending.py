@@ -104,7 +104,7 @@ class RecorderQueues:
         self._connections: Any = None
 
     def extend(self) -> None:
-        """Sets the queue size for new recorders. Call before publishing each message."""
+        """Enlarges the queues of recorders that connected since the last call. Call before publishing each message."""
         connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             self._connections = connections

@@ -270,7 +270,7 @@ class StatePublisher:
         """Publishes the state if a message is due by the wall clock, and measures the real-time factor.
 
         Args:
-            moves: Whether the world runs, or advances by a number of ticks that a client requested.
+            moves: True if the world runs or is executing ticks that a client requested, False if it is stopped.
         """
         now_s = time.monotonic()
         if moves != self._moves:
