@@ -106,7 +106,7 @@ class Primitive(ABC):
 
     @property
     def is_learned(self) -> bool:
-        """Whether the primitive has learned, or was loaded from a file."""
+        """True if the primitive has learned from demonstrations or was loaded from a file."""
         return self._space is not None
 
     @property

@@ -110,7 +110,7 @@ class BackendConformance(ABC):
             assert backend.limits.is_revolute == expected.is_revolute
 
     def test_links_are_where_the_urdf_says(self, pairs: list[tuple[RobotModel, Backend, list[int]]]) -> None:
-        """Each link that a joint moves has the same pose in the library and in `RobotModel`."""
+        """For each link that a joint moves, the tested library and `RobotModel` compute the same pose."""
         for robot, backend, order in pairs:
             for q in self.configurations(robot):
                 for link in _moved_links(robot):

@@ -14,7 +14,7 @@ own_folders.append(str(Path(__file__).parent))
 
 
 def is_foreign(thing: Any) -> bool:
-    """Returns whether a class, a function, or an object's class is defined outside this package."""
+    """Returns True if a class or function, or the class of any other object, is defined outside this package."""
     return full_name(thing).split(":")[0].split(".")[0] != _OWN_PACKAGE
 
 

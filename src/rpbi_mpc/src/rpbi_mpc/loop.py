@@ -126,7 +126,7 @@ class LockStep:
 
     @property
     def is_over(self) -> bool:
-        """Whether the loop has stopped, or the controller's task is done."""
+        """True if the loop has stopped, or if the controller's task is done."""
         return bool(self._stopped) or self.controller.is_finished
 
     def restart(self) -> None:

@@ -117,7 +117,7 @@ class Guard:
 
     @property
     def is_braking(self) -> bool:
-        """Whether `next_braking` has commands: the robot moves, but the guard is halted or targets are late."""
+        """True if `next_braking` has commands: the robot still moves, and the guard is halted or targets are late."""
         return (self.is_halted or self._is_late) and self.is_moving
 
     @property

@@ -1,4 +1,4 @@
-"""Re-exports the entry points of programs, for use by other packages."""
+"""Re-exports the functions that run a program's main function, for use by other packages."""
 
 from custom_ros_tools.program import late_imports, run, run_command
 

@@ -167,7 +167,7 @@ class TasksSolver(Solver):
         return candidates[best]
 
     def _is_at_its_end(self, candidates: Sequence[Candidate], merits: Sequence[float], step: float) -> bool:
-        """Returns whether the search from one start has converged or stalled."""
+        """Returns True if the search from one start has converged, has stalled or has used up its iterations."""
         count, size = len(candidates), candidates[-1].size
         if step < STANDSTILL or count > self._config.iterations or (size <= AIM and not self._has_wishes):
             return True

@@ -21,7 +21,7 @@ logger = logging.getLogger(__name__)
 
 
 class HandAxes:
-    """Computes the displacements of both hands, forward, left and up, since the frame in which they were engaged.
+    """Computes how far both hands have moved forward, left and up since the hands were engaged.
 
     The displacements are relative to the pelvis and its heading, and are divided by the arm's length.
     """

@@ -100,7 +100,7 @@ class HaplyEmulator:
         self.force = ZERO
 
     def _obey(self, message: str | bytes) -> None:
-        """Simulates the time since the last message. Then applies the forces in this message, added up."""
+        """Simulates the time since the last message. Then applies the sum of the forces in `message`."""
         self._pass_time()
         force = ZERO
         for device in json.loads(message).get("inverse3", []):

@@ -118,7 +118,7 @@ class WalkingPerson:
         return float(np.sin(np.pi * since_s / REACHING_S) ** 2)
 
     def _distance_m(self, walking_s: float) -> float:
-        """Returns the distance walked so far [m]. The speed grows smoothly from 0."""
+        """Returns the distance walked in the first `walking_s` seconds [m]. The speed grows smoothly from 0."""
         walking_s = max(walking_s - CROUCHING_S, 0.0)
         return float(self._speed_m_s * (walking_s - SETTLING_S * -np.expm1(-walking_s / SETTLING_S)))
 

@@ -145,7 +145,7 @@ class HapticController:
             self.coupling.observe(turned_about_z(force, -self._yaw), now_s, delay_s)
 
     def observe_tool(self, displacement: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Updates the tool's displacement from its start, in the tool's axes [m]. `delay_s` is the sample's age [s]."""
+        """Updates the tool's displacement from its start, in the tool's axes [m], measured `delay_s` [s] ago."""
         if self._config.mode == "coupling":
             self._tool_displacement = self._handle_displacement(displacement)
             self.coupling.observe(self._tool_displacement, now_s, delay_s)

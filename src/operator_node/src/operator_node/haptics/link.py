@@ -75,7 +75,7 @@ class LoopReport(NamedTuple):
         obeyed: `LoopCommand.switched` of the last executed command.
         resets: `LoopCommand.resets` of the last executed command.
         is_connected: Whether the device is open.
-        has_ended: Whether the device must not be opened again: the user closed it, or a library is missing.
+        has_ended: True if the device must not be opened again, because the user closed it or a library is missing.
         trouble: Reason why the device is not open; empty while it is open.
         samples: Number of readings so far.
         lateness_s: Largest lateness of a tick since the last report [s].

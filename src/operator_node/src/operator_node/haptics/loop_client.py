@@ -91,12 +91,12 @@ class LoopClient:
             self._send(self._command._replace(resets=self._command.resets + 1))
 
     def observe_wrench(self, force: Vector, delay_s: float) -> None:
-        """Sends the force on the tool, finite and in the tool's axes [N]. `delay_s` is the sample's age [s]."""
+        """Sends the force on the tool, finite and in the tool's axes [N], measured `delay_s` [s] ago."""
         with self._lock:
             self._send(self._command._replace(wrench=LoopInput(force, time.monotonic(), delay_s)))
 
     def observe_tool(self, displacement: Vector, delay_s: float) -> None:
-        """Sends the tool's displacement from its start, in the tool's axes [m]. `delay_s` is the sample's age [s]."""
+        """Sends the tool's displacement from its start, in the tool's axes [m], measured `delay_s` [s] ago."""
         with self._lock:
             self._send(self._command._replace(tool=LoopInput(displacement, time.monotonic(), delay_s)))
 

@@ -151,7 +151,7 @@ class JitterBuffer:
         return playout._replace(apart=times[-1] - times[-2])
 
     def _is_apart(self, tick: int, stamp_ns: int) -> bool:
-        """Returns whether the last two targets are too far apart for one stream, by arrivals or by valid stamps."""
+        """Returns True if the arrivals or the valid stamps of the last two targets are too far apart for one stream."""
         last = self._seen[-1]
         sent_ticks = self._sender.ticks_between(last.stamp_ns, stamp_ns) if self._sender.is_right else 0.0
         return max(tick - last.tick, sent_ticks) > self._longest
@@ -240,7 +240,7 @@ class JitterBuffer:
             self._rate += share * (min(max(rate, 1.0 - DRIFT), 1.0 + DRIFT) - self._rate)
 
     def _is_out_of_step(self, times: Sequence[float]) -> bool:
-        """Returns whether the stream's period has changed, or the transport delay has grown permanently."""
+        """Returns True if the stream's period has changed, or if the transport delay has grown permanently."""
         if self._out_of_step >= PERSISTENT:
             return True
         lowest, highest = SAME_PERIOD
@@ -259,7 +259,7 @@ class JitterBuffer:
     def _count_lost(self, times: Sequence[float]) -> None:
         """Counts the targets that were lost before the newest target.
 
-        After a gap, the positions show whether targets were lost or the newest target is late.
+        After a gap, the positions show which case applies: targets were lost, or the newest target is late.
         """
         periods = round((times[-1] - times[-2]) / self._interval)
         if not 1 < periods <= MAX_LOST:
@@ -270,9 +270,9 @@ class JitterBuffer:
             self._seen[-1] = last[-1]._replace(step=periods)
 
     def _compare(self, times: Sequence[float], steps: Sequence[int]) -> None:
-        """Decides whether stamps (or arrivals) or equally spaced times are used as send times.
+        """Chooses one of two estimates of the send times: the stamps (or arrivals), or equally spaced times.
 
-        The send times over which positions change more smoothly are used.
+        Chooses the estimate over which positions change more smoothly.
         """
         last = list(self._seen)[-4:]
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)

@@ -88,7 +88,7 @@ class SenderClock:
         return bool(self.is_right)
 
     def _may_have_waited(self, first_ns: int, last_ns: int) -> bool:
-        """Returns whether a stall of the world or the sender explains why stamps and arrivals disagree.
+        """Returns True if a stall, of the world or of the sender, explains why stamps and arrivals disagree.
 
         A stall is accepted as the explanation until the targets that came after it have left the window of recent
         targets.

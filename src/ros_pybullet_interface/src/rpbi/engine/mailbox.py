@@ -107,7 +107,7 @@ class Mailbox:
         return future
 
     def run_requests(self) -> None:
-        """Makes the queued calls, and sets the calls' futures. Calls queued meanwhile wait for the next run."""
+        """Makes the queued calls, and sets their futures. Calls queued during this run wait for the next run."""
         for _ in range(len(self._requests)):
             call, future, even_if_busy = self._requests.popleft()
             if not future.set_running_or_notify_cancel():

@@ -96,7 +96,7 @@ class Pacer:
 
 
 class Load(NamedTuple):
-    """Times used and ticks made by the process, either until now or between two instants.
+    """Times and number of ticks of the process: totals at one instant, or differences between two instants.
 
     Attributes:
         wall_s: Time by a monotonic wall clock [s].
@@ -123,7 +123,7 @@ class Load(NamedTuple):
         return cls(time.monotonic(), time.thread_time(), time.process_time(), physics_s, ticks)
 
     def since(self, before: Load) -> Load:
-        """Returns the times used and ticks made since an earlier instant."""
+        """Returns the differences between this load and an earlier one, `before`."""
         wall_s, loop_s, process_s, physics_s = (now - then for now, then in zip(self[:4], before[:4]))
         return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
 

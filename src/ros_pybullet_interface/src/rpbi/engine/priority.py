@@ -91,7 +91,7 @@ def run_normally(process_id: int, nice: int) -> None:
 
 
 def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:
-    """Calls a function for each thread of a process, including threads that start meanwhile.
+    """Calls a function for each thread of a process, including threads that start during these calls.
 
     Args:
         process_id: The process.

@@ -237,7 +237,7 @@ class _Process:
         os.set_blocking(self._connection.fileno(), True)  # non-blocking by now if sockets have a default timeout
 
     def answer(self) -> tuple[bool, Any]:
-        """Waits for an answer; returns whether the request succeeded, and the result or the error."""
+        """Waits for an answer. Returns (True, result) if the request succeeded, otherwise (False, error)."""
         try:
             is_good, answer = pickle.loads(self._connection.recv_bytes())
         except (EOFError, OSError) as error:

@@ -45,7 +45,7 @@ class Use(enum.Enum):
 
 
 class Mesh(NamedTuple):
-    """A mesh file, and the use for which PyBullet loads the file."""
+    """A mesh file, and what PyBullet uses the file for."""
 
     use: Use
     file: str

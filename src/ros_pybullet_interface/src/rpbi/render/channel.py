@@ -36,7 +36,7 @@ class CameraRemoved(NamedTuple):
 
 
 class WorldChanged(NamedTuple):
-    """To the renderer: new entries of the world's load log."""
+    """Message to the renderer with the entries of the world's load log that were added since the last such message."""
 
     entries: tuple[LogEntry, ...]
 

@@ -72,7 +72,7 @@ class FastTopic(StateTopic):
         self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
 
     def wrap_connections(self) -> None:
-        """Wraps the connections of new subscribers, so that sending never waits for a subscriber."""
+        """Wraps the connections opened since the last call, so that sending never waits for a subscriber."""
         if self._sending is not None:
             self._sending.wrap_connections()
 
@@ -82,6 +82,6 @@ class FastTopic(StateTopic):
         super().publish(message)
 
     def serve_late(self, last_message: Callable[[], Any]) -> None:
-        """Sends the last message to new subscribers."""
+        """Wraps connections, and then does the same as `StateTopic.serve_late`."""
         self.wrap_connections()
         super().serve_late(last_message)

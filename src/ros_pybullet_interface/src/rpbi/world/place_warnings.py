@@ -149,7 +149,7 @@ def _needs_points(body: Body) -> bool:
 
 
 def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool:
-    """Returns whether a body rests on `plane`, or will rest on `plane` after a fall.
+    """Returns True if a body rests on `plane`, or if it will fall onto `plane`.
 
     Args:
         world: The world.

@@ -185,7 +185,7 @@ class SensorSchedule:
 
 
 def _acts_at_ticks(sensor_type: type[Sensor]) -> bool:
-    """Returns whether a sensor class overrides `before_step` or `after_step`."""
+    """Returns True if a sensor class overrides at least one of `before_step` and `after_step`."""
     return sensor_type.before_step is not Sensor.before_step or sensor_type.after_step is not Sensor.after_step
 
 

@@ -634,7 +634,7 @@ class World:
         """Makes a keyframe as `keyframe` does, but in parts, and yields after each part.
 
         Each part builds one body in the fresh client. The world may step between parts. If bodies are added, removed or
-        changed meanwhile, all bodies are built again. The world moves into the fresh client in the last part.
+        changed between parts, all bodies are built again. The world moves into the fresh client in the last part.
         """
         while True:
             refuse(self)

@@ -137,7 +137,7 @@ def is_used(topic: str, kinds: Collection[str], row_options: RowOptions) -> bool
 
 
 def is_image(kind: str) -> bool:
-    """Returns whether a message type is the type of raw or compressed images."""
+    """Returns True for the message types of raw images and of compressed images."""
     return kind in (RAW_TYPE, COMPRESSED_TYPE)
 
 

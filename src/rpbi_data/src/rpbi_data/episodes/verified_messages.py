@@ -141,7 +141,10 @@ def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMI
 
 
 def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs: int) -> tuple[bool, str, list[str]]:
-    """Simulates an episode. Returns whether the result equals the recording, a text about the result, and notes."""
+    """Simulates an episode again. Returns whether it equals the recording, a text about the outcome, and notes.
+
+    For the notes, see `_message_faults`.
+    """
     with recorded_episode(folder, episode, limits.any_size) as (bag, recording):
         require_few_ticks(bag, recording, limits.max_ticks)
         compare = partial(_compare, bag, episode.namespace, recording)

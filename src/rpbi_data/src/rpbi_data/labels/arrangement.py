@@ -136,7 +136,7 @@ class Arrangement:
         return target + distance * direction, target
 
     def _is_clear(self, eye: Array, target: Array) -> bool:
-        """Returns whether no robot is near the camera position `eye`, or between `eye` and `target`."""
+        """Returns True if no robot is near the camera position `eye`, and no robot hides `target` from `eye`."""
         pb, robots = self._world.pb, {body.body_id: body for body in self._world.bodies.values() if body.joint_indices}
         for body_id, body in robots.items():
             for link in (-1, *body.joint_indices):

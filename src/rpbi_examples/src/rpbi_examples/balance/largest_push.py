@@ -108,7 +108,7 @@ def draw(pushes: Mapping[str, float], path: Path) -> None:
 
 
 def main() -> None:
-    """Computes and prints the table, or reads a table from the file `--table`. With `--out`, also plots the table."""
+    """Prints a table of the largest pushes, or reads such a table from the file `--table`. `--out` plots the table."""
     parser = argparse.ArgumentParser(description="Finds the largest push that Talos withstands, by direction.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the start and the target (default: 1)")
     parser.add_argument("--out", type=Path, help="picture of the table")

@@ -90,7 +90,7 @@ class Trial:
 
     @property
     def is_over(self) -> bool:
-        """Whether the controller is done, or the trial has timed out."""
+        """True if the controller is done, or if the trial has timed out."""
         return self._dressing.is_done or self.time_s >= MAX_DURATION_S
 
     def step(self) -> None:

@@ -99,7 +99,7 @@ class Person:
         random: Random generator for small errors of the aim.
 
     Attributes:
-        is_done: Whether the box is at its goal, or the person has given up.
+        is_done: True if the box is at its goal, or if the person has given up.
     """
 
     def __init__(self, goal: PlanarPose, speed: float, random: np.random.Generator) -> None:

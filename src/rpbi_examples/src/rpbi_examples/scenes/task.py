@@ -116,7 +116,7 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves the robots in the action; `Scene.beside` moves the others. The action None moves no robot."""
+        """Moves the robots that the action controls; `Scene.beside` moves the other robots. None commands nothing."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)
@@ -138,7 +138,7 @@ class SceneTask(WorldTask):
         return self.scene.has_succeeded()
 
     def has_ended(self) -> bool:
-        """Returns whether the scene has succeeded, or can no longer succeed."""
+        """Returns True if the scene has succeeded, or if it can no longer succeed."""
         return self._has_failed or self.has_succeeded()
 
     def _see(self) -> Seen:

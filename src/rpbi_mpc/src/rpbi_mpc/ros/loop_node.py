@@ -138,7 +138,7 @@ class LoopNode:
             rospy.logwarn_throttle(WARNING_PERIOD_S, f"{text}; end other programs (docs/slow.md)")
 
     def _is_due(self) -> bool:
-        """Returns whether a cycle is due, because the loop runs or a single cycle has been requested.
+        """Returns True if a cycle is due: if the loop runs, or if a single cycle has been requested.
 
         If the plant is not timed, waits at most 0.1 s for a request.
         """

@@ -173,7 +173,7 @@ def _is_number(leaf: Leaf) -> bool:
 
 
 def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
-    """Returns whether a message type may have numbers at or below a path if its arrays are long enough."""
+    """Returns whether messages of a type have numbers at or below a path, provided that arrays are long enough."""
     if not isinstance(field_type, MessageType):
         return not path and field_type != "string"
     paths = ((field, _path_below(field, path)) for field in field_type.fields)

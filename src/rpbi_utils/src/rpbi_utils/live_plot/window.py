@@ -131,7 +131,7 @@ class Canvas(QWidget):
         painter.end()
 
     def _charts(self, end_s: float, lines: list[Line]) -> list[Chart]:
-        """Returns the charts from top to bottom. The first chart includes the missing lines."""
+        """Returns one chart per unit, from top to bottom. The first chart also includes the lines without samples."""
         of_unit: dict[str, list[Line]] = {}
         for line in lines:
             if not line.note:

@@ -45,7 +45,7 @@ SWITCH_S = 0.0005
 
 
 class GuardNode:
-    """Checks targets with a guard, and publishes the commands on which the guard decides.
+    """Checks targets with a guard, and publishes the commands that the guard returns.
 
     Raises:
         ConfigError: If a parameter, or the robot's description, is wrong.

@@ -52,7 +52,10 @@ class DirectSending:
         return cls(publisher, limit) if cls._is_possible else None
 
     def wrap_connections(self) -> None:
-        """Replaces the sockets of new connections by `BufferedSocket`s. Call before publishing each message."""
+        """Replaces the sockets of connections that opened since the last call by `BufferedSocket`s.
+
+        Call before publishing each message.
+        """
         connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             for connection in connections:

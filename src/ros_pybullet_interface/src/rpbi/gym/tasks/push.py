@@ -71,6 +71,6 @@ class PushTask(HandTask):
         return bool(self.distance() <= self.config.tolerance)
 
     def has_ended(self) -> bool:
-        """Returns whether the body is at the goal, or horizontally outside the workspace."""
+        """Returns True if the body is at the goal, or if it is outside the workspace in x or y."""
         position, low, high = self.position_of(self.config.object), self.config.low, self.config.high
         return self.has_succeeded() or not all(low[i] <= position[i] <= high[i] for i in (0, 1))

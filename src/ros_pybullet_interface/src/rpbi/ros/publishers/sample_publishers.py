@@ -54,7 +54,7 @@ class TopicPublisher:
                 raise
 
     def serve_late(self) -> None:
-        """Sends the last sample of each sensor to new subscribers."""
+        """Sends the last sample of each sensor to subscribers that have connected since that sample was published."""
         for key, (topic, to_message) in self._routes.items():
             if key in self._last:
                 with plugin_errors(to_message, f"the message of '{key[1]}'"):
@@ -129,7 +129,7 @@ class SamplePublishers:
         self.cameras.flush()
 
     def serve_late(self) -> None:
-        """Sends the last samples to new subscribers."""
+        """Sends the last samples to subscribers that have connected since these samples were published."""
         for publisher in self._all:
             publisher.serve_late()
 

@@ -77,7 +77,7 @@ class TransformPublisher(TransformCollector):
             self._topic.publish(message)
 
     def serve_late(self) -> None:
-        """Sends the last link poses of all bodies to new subscribers."""
+        """Sends the last link poses of all bodies to subscribers that have connected since the last publication."""
         self._topic.serve_late(self.last)
 
 

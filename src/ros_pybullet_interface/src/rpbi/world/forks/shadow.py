@@ -223,7 +223,7 @@ class Shadow:
 
         Args:
             state: Present state of the world.
-            commands: Number of commands of the world so far.
+            commands: Number of commands since the world was built or reset.
             niceness: Increment of niceness over this process, from 0 to 19; a higher value means less processor time.
         """
         ours, theirs = Pipe()
@@ -248,8 +248,7 @@ class Shadow:
 
         Args:
             state: Present state of the world.
-            commands: Number of commands of the world so far.
-
+            commands: Number of commands since the world was built or reset.
         Raises:
             InterfaceError: If the shadow has ended.
         """

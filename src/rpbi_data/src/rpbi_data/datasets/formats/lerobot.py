@@ -217,7 +217,7 @@ class LeRobot(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder contains `meta/info.json`, or at least the folders `meta` and `data`."""
+        """Returns True if a folder contains the file `meta/info.json`, or both of the folders `meta` and `data`."""
         return (folder / "meta").is_dir() and ((folder / "meta/info.json").exists() or (folder / "data").is_dir())
 
     @classmethod

@@ -73,7 +73,7 @@ class Mcap(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder has subfolders with a `metadata.yaml` or an MCAP file."""
+        """Returns True if at least one subfolder of a folder contains a `metadata.yaml` or an MCAP file."""
         return bool([*folder.glob("*/metadata.yaml"), *folder.glob("*/*.mcap")])
 
     @classmethod

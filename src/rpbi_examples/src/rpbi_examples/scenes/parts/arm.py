@@ -61,7 +61,7 @@ class LedArm:
         return list(self._positions)
 
     def positions_at(self, pose: Pose) -> list[float]:
-        """Returns joint positions [rad or m] at which the link has a pose in the world, near the last targets.
+        """Returns joint positions [rad or m] that bring the link to a world pose. Searches from the last targets.
 
         Raises:
             SceneFailedError: If the pose is out of reach.
