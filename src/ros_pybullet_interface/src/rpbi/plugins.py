@@ -26,7 +26,7 @@ def raise_plugin_error(thing: Any, doing: str, error: Exception) -> None:
 
     Args:
         thing: The class, function or object that failed.
-        doing: The action that failed, for the message, such as `compute`.
+        doing: The action that failed, such as `compute`, for the error message.
         error: The error.
 
     Raises:

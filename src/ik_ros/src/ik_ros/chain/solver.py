@@ -147,7 +147,7 @@ def refuse_mimics(config: ChainConfig, solver: str) -> None:
 
     Args:
         config: Options with the chain.
-        solver: Name of the solver, for the message.
+        solver: Name of the solver, for the error message.
 
     Raises:
         ConfigError: If the chain has mimic joints; the message names these joints.
@@ -170,7 +170,7 @@ def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> Non
 
     Args:
         problem: The problem.
-        solver: Name of the solver, for the message.
+        solver: Name of the solver, for the error message.
         may_turn: Whether larger tolerances for rotations are allowed.
 
     Raises:

@@ -30,7 +30,7 @@ class Motion(ABC):
         joints: Indices of the joints that the motion drives.
 
     Attributes:
-        result: Future of the outcome. The future is set when the motion ends, for whatever reason.
+        result: Future of the `MotionResult`. The future is set when the motion ends, for whatever reason.
     """
 
     can_wait: ClassVar[bool] = False

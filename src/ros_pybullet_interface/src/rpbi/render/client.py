@@ -165,14 +165,14 @@ class RenderClient:
         self._send_waiting(sample.name)
 
     def serve_late(self) -> None:
-        """Sends the last scenes of cameras with new viewers to the renderer again, while the world is stopped."""
+        """Sends the last scene of each camera that gained viewers while the world is stopped to the renderer again."""
         for name, scene in self._last.items():
             if self._demands.get(name, NO_DEMAND).seen > self._served.get(name, 0):
                 self._waiting.setdefault(name, scene)
                 self._send_waiting(name)
 
     def forget_scenes(self) -> None:
-        """Drops the scenes that wait to be sent, and the scenes that are kept for new viewers."""
+        """Drops the scenes that wait to be sent, and the scenes that are kept for viewers that connect later."""
         self._waiting.clear()
         self._last.clear()
 

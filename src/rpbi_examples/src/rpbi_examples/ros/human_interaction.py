@@ -86,7 +86,7 @@ class Watch:
         rospy.signal_shutdown("the press is over")
 
     def _begin(self) -> None:
-        """Waits for the other nodes, and switches on the nodes with which the arm follows the handle."""
+        """Waits for sensor, guard and arm. Then switches on IK and haptics, so that the arm follows the handle."""
         # the call tares the sensor; without contact, the sensor measures the weight of the tool
         get_srv_handler(SENSOR, Empty)()
         rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=MAX_BUFFERED, tcp_nodelay=True)

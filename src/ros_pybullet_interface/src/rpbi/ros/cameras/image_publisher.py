@@ -148,7 +148,7 @@ class _CameraTopics:
         return Demand(streams, sum(topic.seen for _, topic in topics))
 
     def publish(self, frame: Frame) -> None:
-        """Publishes the images of a frame; sends a frame with the last frame's stamp to new subscribers only."""
+        """Publishes a frame's images. If the last frame had the same stamp, sends to later subscribers only."""
         header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
         again = frame.stamp_ns == self._published_ns
         for stream, topic in self._topics.values():

@@ -99,11 +99,11 @@ class ScenePublisher:
             )
 
     def serve_late(self) -> None:
-        """Makes the renderer process send the last images to new subscribers."""
+        """Makes the renderer process send the last images to subscribers that have connected since these images."""
         self._renderer.serve_late()
 
     def restart(self) -> None:
-        """Drops all scenes that wait to be drawn or are kept for new subscribers, after a reset."""
+        """Drops all scenes that wait to be drawn or are kept for later subscribers. Called after a reset."""
         self._renderer.forget_scenes()
 
     def forget(self, name: str) -> None:

@@ -34,7 +34,7 @@ class _Recipient:
 
 
 class _CommandTopic(FastTopic):
-    """The topic `rpbi/commands`, with a list of new subscribers, which need all earlier commands."""
+    """The topic `rpbi/commands`, with a list of subscribers to which all earlier commands must still be sent."""
 
     def __init__(self) -> None:
         self.newcomers: deque[_Recipient] = deque()
@@ -80,7 +80,7 @@ class CommandPublisher:
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
 
     def catch_up(self) -> None:
-        """Sends all new commands to all subscribers."""
+        """Sends all commands that have not been sent yet to all subscribers."""
         self.spin()
         while self._all.next != self._world.commands.count:
             self.spin()

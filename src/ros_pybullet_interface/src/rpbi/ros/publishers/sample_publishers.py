@@ -198,7 +198,7 @@ class TickPublisher:
             self._clock.publish_now()
 
     def repeat_time(self) -> None:
-        """Publishes the time of a stopped world again, for new subscribers."""
+        """Publishes the time of a stopped world again, so that later subscribers receive it too."""
         if self._clock is not None:
             self._clock.repeat()
 

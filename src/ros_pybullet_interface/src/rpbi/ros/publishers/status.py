@@ -116,7 +116,7 @@ class ClockPublisher:
         self._send()
 
     def repeat(self) -> None:
-        """Publishes the time of a stopped world again every STOPPED_CLOCK_PERIOD_S, for new subscribers."""
+        """Publishes a stopped world's time every STOPPED_CLOCK_PERIOD_S, so that later subscribers receive it too."""
         if time.monotonic() >= self._due_s or self._clock.stamp_ns != self._sent_ns:
             self.publish_now()
 

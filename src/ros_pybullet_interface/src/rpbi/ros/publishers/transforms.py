@@ -26,7 +26,7 @@ class TransformCollector:
         self._collected: list[TransformStamped] = []
 
     def collect(self, sample: LinkPoseSample, stamp_ns: int) -> None:
-        """Adds the link poses of a body to the message."""
+        """Adds the link poses of a body to the next TF message."""
         transforms = self._last.get(sample.name)
         if transforms is None or len(transforms) != len(sample.frames):
             transforms = self._last[sample.name] = [_transform(frame) for frame in sample.frames]

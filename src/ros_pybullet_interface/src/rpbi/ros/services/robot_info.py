@@ -49,7 +49,7 @@ def _joint_info(info: tuple, joint: Joint) -> JointInfo:
 
     Args:
         info: Result of `getJointInfo` for the joint.
-        joint: The joint, for the message fields that PyBullet does not return.
+        joint: The joint, which supplies the message fields that PyBullet does not return.
     """
     index, name, joint_type, *numbers, link, axis, position, quat, parent = info
     place = Point(*axis), Point(*position), Quaternion(*quat), parent

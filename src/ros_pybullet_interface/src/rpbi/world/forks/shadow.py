@@ -191,7 +191,7 @@ class Shadow:
     def __init__(self, connection: Connection, process: subprocess.Popen[bytes] | _Copy, commands: int) -> None:
         self._remote, self._process = Remote(connection, "the process that follows the world"), process
         self.commands = commands
-        """Number of commands that it knows."""
+        """Number of the world's commands that the shadow has received."""
 
     @classmethod
     def of(cls, world: Any, state: WorldState) -> Shadow:
