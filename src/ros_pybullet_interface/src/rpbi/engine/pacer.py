@@ -114,7 +114,7 @@ class Load(NamedTuple):
 
     @classmethod
     def now(cls, physics_s: float, ticks: int) -> Load:
-        """Returns the load until now. Must be called in the thread that runs the world, whose processor time is measured.
+        """Returns the load until now; called in the thread that runs the world, whose processor time is measured.
 
         Args:
             physics_s: Wall time [s] spent in PyBullet's steps.
