@@ -13,6 +13,7 @@ import rospy
 from geometry_msgs.msg import InertiaStamped, Vector3, WrenchStamped
 from node_world import Rosout, main_config, publishing
 from ros_system import RosSystem, wait_until
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -46,6 +47,8 @@ def arm(ros: RosSystem) -> dict[str, Any]:
 def node(ros: RosSystem) -> Iterator[RosSystem]:
     ros.simulator(arm(ros), use_sim_time=True)
     rospy.set_param("/use_sim_time", True)
+    clock = ros.listen("/clock", Clock)
+    wait_until(lambda: clock.messages[-1].clock.to_sec() > 1.0, "the arm has settled")
     words = ["__name:=calibrate", f"wrench:={READING}", "wrench/calibrated:=calibrated"]
     ros.start(["rosrun", "rpbi_utils", "calibrate_wrench_node.py", *words])
     yield ros

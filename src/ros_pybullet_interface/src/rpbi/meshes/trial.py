@@ -71,7 +71,7 @@ def limit_resources(cpu_s: int) -> None:
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
-    """Tries the meshes that did not pass earlier. Returns an error message for each mesh that PyBullet cannot load."""
+    """Tries each mesh that has not passed a trial yet; returns an error message for each that PyBullet cannot load."""
     faults: dict[Mesh, str] = {}
     unknown: dict[Mesh, Path] = {}
     for mesh in dict.fromkeys(meshes):

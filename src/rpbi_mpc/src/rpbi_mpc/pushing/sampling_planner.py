@@ -1,4 +1,4 @@
-"""A planner for pushing that simulates candidate plans in forks of the world, and plans from the candidates' costs."""
+"""A planner for pushing that simulates candidate plans in forks of the world, and combines them by their costs."""
 
 from __future__ import annotations
 

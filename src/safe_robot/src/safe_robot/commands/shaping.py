@@ -53,8 +53,9 @@ class Shaper:
     def shaped(self, target: tuple[float, ...], state: State, stop: np.ndarray) -> tuple[float, ...]:
         """Returns the next command towards a target, n positions [rad or m].
 
-        A target that the joints can follow is returned, clipped to the position limits. A target that jumps by more
-        than the option `reach`, or exceeds a position limit by more than `OVERSHOOT`, is returned unchanged.
+        A target that the joints can follow is returned, clipped to the position limits. For a target that is too fast,
+        the command brings the joints nearer to it. A target that jumps by more than the option `reach`, or exceeds a
+        position limit by more than `OVERSHOOT`, is returned unchanged, so that the guard's checks refuse it.
 
         Args:
             target: n positions [rad or m].

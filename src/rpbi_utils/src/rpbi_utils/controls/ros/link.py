@@ -1,4 +1,4 @@
-"""Watches the running simulator for the controls window, through topics and the ROS master. Does not use Qt."""
+"""Connects the controls window to the running simulator through topics and the ROS master. Does not use Qt."""
 
 import threading
 import time
