@@ -38,7 +38,7 @@ class ReleaseDMP:
         d_gain: Damping for a duration of 1 s [1/s].
         weights: Weights of Gaussians that approximate the forcing term; used if `f_domain` is empty.
         f_domain: Increasing times of the forcing term's samples, as fractions of the duration.
-        f_targets: Samples of the forcing term at the times `f_domain`, divided by the phase.
+        f_targets: Values of the quotient forcing term / phase at the times `f_domain`.
     """
 
     k_gain: float
