@@ -18,7 +18,7 @@ from import_graph import ImportGraph, circles_of, imported_names
 
 ROOT = Path(__file__).resolve().parent.parent
 MAX_SMALL = 18
-MAX_SCENE_LINES = 150
+MAX_SCENE_LINES = 170
 MAX_WORDS = 10
 SMALL_LINES = 60
 TABLES = (
@@ -317,7 +317,7 @@ BREAKS = {
     repeated: ({"engine/pacer.py": "import xml.etree.ElementTree"}, "rpbi.engine.pacer"),
     shared_class_names: ({"engine/pacer.py": "class Mailbox:\n    pass"}, "rpbi.engine.pacer"),
     long_scenes: (
-        {f"{SCENES}/__init__.py": "'rpbi_examples.scenes.new:New'", f"{SCENES}/new.py": "\n" * 150},
+        {f"{SCENES}/__init__.py": "'rpbi_examples.scenes.new:New'", f"{SCENES}/new.py": "\n" * (MAX_SCENE_LINES + 1)},
         "new.py has 152",
     ),
     wordy_test_names: (

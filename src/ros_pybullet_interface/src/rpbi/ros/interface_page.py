@@ -33,8 +33,8 @@ for your own world.
 - A message that has NaN, an unknown joint or the wrong number of values changes nothing and is logged. A
   service that refuses a request answers `success: false` and the reason."""
 WINDOW = """\
-With `connection_mode: GUI`, see [windows.md](windows.md#pybullets-own-window); without a window nothing is published, and changes of the view are
-refused."""
+With `connection_mode: GUI`, see [windows.md](windows.md#pybullets-own-window). Without a window nothing is published,
+and changes of the view are refused."""
 OBJECTS = """\
 The column *of* names types of objects, see [concepts.md](concepts.md#bodies-and-sensors). Objects of your own types and
 your own sensors also have those that their classes name, see [extending.md](extending.md)."""
