@@ -1,6 +1,7 @@
 """Generates the reference pages of all YAML files and their keys, and the JSON Schemas of these files."""
 
 import re
+import textwrap
 from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -138,7 +139,8 @@ def _home(place: Place) -> str:
 def _page(name: str, parts: list[str]) -> str:
     title, beginning = BEGINNINGS[name]
     rules = f"For rules that hold for all files see [{OVERVIEW}]({OVERVIEW})."
-    return page([WRITTEN_BY, f"# {title}", f"{beginning} {rules}", *parts]).replace(f"]({name}#", "](#")
+    first = textwrap.fill(f"{beginning} {rules}", 120, break_on_hyphens=False)
+    return page([WRITTEN_BY, f"# {title}", first, *parts]).replace(f"]({name}#", "](#")
 
 
 def _nodes(nodes: Mapping[str, Schema]) -> Iterator[str]:
