@@ -13,6 +13,7 @@ def bench(
     *names: Annotated[str, Argument("[NAME ...]", offers="benchmarks", files="*")],
     quick: Annotated[bool, Argument("")] = False,
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*")] = None,
+    page: Annotated[bool, Argument("")] = False,
 ) -> int:
     """Runs the benchmarks, each with its lower bound.
 
@@ -21,6 +22,7 @@ def bench(
             keyframes, lfd, live_plot, passivity, press, pushing, recording, soak, streams, teleop and verify
         quick: measures for a shorter time, less exactly
         json: file for the figures
+        page: also writes them, with machine, date and commit, into docs/results.md; other benchmarks keep theirs there
     """
     sys.path.insert(0, str(workspace() / "dev/benchmarks"))
     benchmarks = importlib.import_module("run")
@@ -28,4 +30,4 @@ def bench(
     for name in names:
         if name not in known:
             raise UsageError(f"there is no benchmark '{name}'; there are {', '.join(known)}")
-    return int(benchmarks.run(names, quick, json))
+    return int(benchmarks.run(names, quick, json, page))
