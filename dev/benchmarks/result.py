@@ -72,7 +72,7 @@ def table(results: Sequence[Result]) -> str:
     rows = [("benchmark", "figure", "value", "unit", "floor", "ratio", "target", "reached")]
     for one in results:
         reached = {None: "", True: "yes", False: "NO"}[one.reached]
-        numbers = [number(number) for number in (one.value, one.floor, one.ratio)]
+        numbers = [number(each) for each in (one.value, one.floor, one.ratio)]
         target = str(one.target or "")
         rows.append((one.benchmark, one.figure, numbers[0], one.unit, *numbers[1:], target, reached))
     widths = [max(map(len, column)) for column in zip(*rows)]

@@ -28,9 +28,9 @@ Compare these figures with those of your computer:
 ./rpbi bench loop --page     # also onto this page
 ```
 
-The floor is the same quantity of the simplest program that does the job, measured in the same run. A quick run measures for a
-shorter time. A load average above the number of cores means that other programs were busy. Neither shows how fast the
-simulator can be.
+The floor is the same quantity of the simplest program that does the job, measured in the same run. A quick run measures
+for a shorter time. A load average above the number of cores means that other programs were busy. Neither shows how fast
+the simulator can be.
 """
 COLUMNS = ("figure", "value", "unit", "floor", "value / floor", "target", "reached")
 

@@ -83,7 +83,9 @@ def on_post_build(config: Any) -> None:
 
 def pages_of(item: Any) -> list[Page]:
     """Returns the pages of a part of the navigation, in their order."""
-    return [page for child in item.children for page in pages_of(child)] if isinstance(item, Section) else [item]
+    if isinstance(item, Section):
+        return [page for child in item.children for page in pages_of(child)]
+    return [item] if isinstance(item, Page) else []
 
 
 def entry(page: Page) -> str:

@@ -101,7 +101,7 @@ def docs(
         return 1 if serve else 0
     if serve:
         return run_mkdocs(root, "serve", "--no-strict", "--dev-addr", f"127.0.0.1:{port}")
-    code = run_mkdocs(root, "build", "--quiet")
+    code = run_mkdocs(root, "build")  # without --quiet, which hides warnings and lets them pass
     print("no site" if code else "built: out/site/index.html")
     return code
 
