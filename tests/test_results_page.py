@@ -11,7 +11,7 @@ sys.path.append(str(ROOT / "dev/benchmarks"))
 import results_page  # noqa: E402
 from result import Result, Target  # noqa: E402
 
-MACHINE = dict.fromkeys(("cores", "processor", "load_average", "python", "pybullet", "renderer"), "?")
+MACHINE = dict.fromkeys(("date", "commit", "cores", "processor", "load_average", "python", "pybullet", "renderer"), "?")
 
 
 def test_page_is_that_of_the_kept_figures():
@@ -26,4 +26,4 @@ def test_new_figures_replace_former_ones_of_the_same_benchmark(monkeypatch, tmp_
     page = results_page.page()
     assert "| time of loop | 30 | ms | 10 | 3 | <= 2 x floor | no |" in page and "| time of loop | 1 |" not in page
     assert "| time of tables | 2 | ms | 10 | 0.2 | <= 2 x floor | yes |" in page
-    assert page.count("Quick run of 2") == 2
+    assert page.count("Quick run of ? at commit `?`: ? cores") == 2

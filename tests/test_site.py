@@ -113,6 +113,13 @@ def test_loads_from_elsewhere_are_found(tmp_path):
     assert external(tmp_path) == found
 
 
+def test_links_have_headings_as_texts(site):
+    """The pages name others by file, for readers of the repository."""
+    assert "gym.md](gym.md" in (ROOT / "docs/questions.md").read_text()
+    texts = re.findall(r"<a\b[^>]*>([^<]*\.md)</a>", "".join(path.read_text() for path in site.glob("*.html")))
+    assert texts == []
+
+
 def test_planted_faults_are_named(tmp_path):
     shutil.copytree(CONFIG.parent, tmp_path / "dev/site", ignore=shutil.ignore_patterns("api", "__pycache__"))
     config = tmp_path / "dev/site" / CONFIG.name

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ast
-import datetime
 import json
-import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -38,10 +36,8 @@ COLUMNS = ("figure", "value", "unit", "floor", "value / floor", "target", "reach
 def keep(name: str, results: Sequence[Result], machine: Mapping[str, Any], quick: bool) -> None:
     """Keeps the figures of a benchmark, in place of former ones."""
     report = {
-        "date": datetime.date.today().isoformat(),
-        "commit": _git("describe", "--always", "--dirty", "--abbrev=10"),
-        "quick": quick,
         "machine": machine,
+        "quick": quick,
         "results": [one.as_dict() for one in results],
     }
     KEPT.mkdir(exist_ok=True)
@@ -61,7 +57,7 @@ def write() -> None:
 def _section(path: Path) -> str:
     report = json.loads(path.read_text(encoding="utf-8"))
     machine = report["machine"]
-    run = f"{'Quick run' if report['quick'] else 'Run'} of {report['date']} at commit `{report['commit']}`"
+    run = f"{'Quick run' if report['quick'] else 'Run'} of {machine['date']} at commit `{machine['commit']}`"
     computer = f"{machine['cores']} cores of {machine['processor']}, load average {machine['load_average']}"
     versions = f"Python {machine['python']}, PyBullet {machine['pybullet']}, renderer {machine['renderer']}"
     rows = [COLUMNS, ("---",) * len(COLUMNS), *map(_row, report["results"])]
@@ -80,7 +76,3 @@ def _summary(name: str) -> str:
     file = next(path for path in (HERE / f"{name}.py", HERE / name / "__init__.py") if path.exists())
     doc = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
     return doc.partition("\n\n")[0]
-
-
-def _git(*words: str) -> str:
-    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True).stdout.strip() or "unknown"

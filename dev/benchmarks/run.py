@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import importlib
 import json
 import os
@@ -90,8 +91,12 @@ def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None
 
 
 def machine() -> dict[str, Any]:
-    """Returns the properties of the machine that figures depend on."""
+    """Returns the properties of the machine and of the workspace that figures depend on."""
+    describe = ("git", "describe", "--always", "--dirty", "--abbrev=10")
+    commit = subprocess.run(describe, cwd=Path(__file__).parent, capture_output=True, text=True).stdout.strip()
     return {
+        "date": datetime.date.today().isoformat(),
+        "commit": commit or "unknown",
         "cores": os.cpu_count(),
         "processor": _processor(),
         "load_average": round(os.getloadavg()[0], 2),

@@ -17,6 +17,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 LINK_OUT = re.compile(r"\]\(\.\./((?:src|tests|dev)/[^)\s#]+)\)")
 """A link to a file of the repository outside docs."""
+FILE_AS_TEXT = re.compile(r"\[`?(\w+\.md)`?\]\(")
+"""A link whose text is the file name of a page."""
 
 LOG = logging.getLogger("mkdocs.hooks.site")
 MIRROR = tempfile.TemporaryDirectory(prefix="site-api-")
@@ -49,13 +51,19 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
-    """Points links out of docs to the copies in the site, and applies `extra.search` to the page."""
+    """Applies `extra.search`, gives links the headings of pages as texts, and points links out of docs to copies."""
     search = config.extra["search"]
     page.meta["search"] = {"boost": search["boost"].get(page.file.src_uri, 1)}
     page.meta["tags"] = search["words"].get(page.file.src_uri, [])
-    if page.is_homepage:
-        page.meta["hide"] = ["navigation", "toc"]
-    return LINK_OUT.sub(r"](files/\1)", markdown)
+    named = FILE_AS_TEXT.sub(lambda match: f"[{heading(config, match[1])}](", markdown)
+    return LINK_OUT.sub(r"](files/\1)", named)
+
+
+def heading(config: Any, name: str) -> str:
+    """Returns the first heading of a page, or its file name if the page is not there."""
+    path = Path(config.docs_dir, name)
+    found = re.search(r"^# (.*)", path.read_text(encoding="utf-8"), re.MULTILINE) if path.exists() else None
+    return found[1] if found else name
 
 
 def on_env(env: Any, config: Any, files: Files) -> None:
