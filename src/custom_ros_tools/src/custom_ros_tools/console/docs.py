@@ -56,6 +56,7 @@ WRITERS = (
     "rpbi.ros.interface_page:interface_files",
     "custom_ros_tools.console.docs:console_files",
     "rpbi_examples.plugins_page:plugin_files",
+    "custom_ros_tools.console.release:version_files",
 )
 """Functions that take the folder of the workspace, and return the texts of generated files by path."""
 
@@ -94,7 +95,8 @@ def docs(
     for path, text in files(root).items():
         path.parent.mkdir(exist_ok=True)
         is_new = not path.exists() or path.read_text(encoding="utf-8") != text
-        path.write_text(text, encoding="utf-8")
+        if is_new:  # a package.xml with a new time would be built again
+            path.write_text(text, encoding="utf-8")
         print(f"{'written' if is_new else 'unchanged'}: {path.relative_to(root)}")
     if find_spec("mkdocs") is None:
         print(f"no site: {PROGRAM} setup site installs the tools for it", file=sys.stderr)
