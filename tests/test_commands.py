@@ -79,6 +79,12 @@ def test_an_unknown_command_is_refused_with_the_list(bare):
     assert run([bare, "qqq"]).stderr.startswith("There is no command 'qqq'.\n")
 
 
+def test_shell_refuses_a_command_without_c():
+    done = run([ROOT / "rpbi", "shell", "python3", "x.py"])
+    assert done.returncode == 2 and done.stdout == ""
+    assert "expected -c before a command, got 'python3': ./rpbi shell -c 'python3 x.py'" in done.stderr
+
+
 def test_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
     done = run([bare, "check", WORLD])
     assert done.returncode == 1

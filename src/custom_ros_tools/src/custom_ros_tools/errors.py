@@ -1,6 +1,6 @@
 """Error classes of the workspace, which all derive from `InterfaceError`.
 
-The class of an error tells who can correct the fault, such as the author of a configuration. Most errors store data,
+The class of an error says who can correct the fault, such as the author of a configuration. Most errors store data,
 from which they compose the message.
 """
 

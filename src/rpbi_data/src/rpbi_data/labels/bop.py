@@ -128,11 +128,11 @@ class BopFolder:
             self._write(255 * label.whole.mask.astype(np.uint8), f"mask/{mask}", QUICK)
             self._write(255 * label.visible.astype(np.uint8), f"mask_visib/{mask}", QUICK)
 
-    def close(self, told: str) -> None:
+    def close(self, description: str) -> None:
         """Writes the labels and a description of the data set.
 
         Args:
-            told: Description of the data set, in Markdown.
+            description: Description of the data set, in Markdown.
 
         Raises:
             OSError: If a file cannot be written.
@@ -147,7 +147,7 @@ class BopFolder:
         (scene / "scene_gt_coco.json").write_text(json.dumps(self._coco()) + "\n")
         kinds = "\n".join(f"| {obj_id} | {model.name} |" for obj_id, model in self._models.items())
         table = f"| `obj_id` | object |\n|---|---|\n{kinds}\n"
-        (self._path / "dataset_info.md").write_text(f"# {self._name}\n\n{told}\n\n{table}")
+        (self._path / "dataset_info.md").write_text(f"# {self._name}\n\n{description}\n\n{table}")
 
     def _write(self, pixels: npt.NDArray[Any], name: str, level: int) -> None:
         Image.fromarray(pixels).save(self._path / SCENE / name, compress_level=level)
