@@ -37,6 +37,14 @@ def test_the_master_knows_nothing_of_a_node_that_has_ended(ros):
         master.lookupNode("/leaver")
 
 
+def test_interrupted_node_ends_quietly_while_it_publishes(ros):
+    node = ros.start_program("publishes_to_its_end.py")
+    ros.listen("/beats", Empty).wait_for(1)
+    os.killpg(node.pid, signal.SIGINT)
+    assert node.wait(60.0) == 0, ros.output(node)
+    assert "Traceback" not in ros.output(node)
+
+
 def test_node_continues_when_its_output_is_on_a_full_disk(ros):
     beats, logged = ros.listen("/beats", Empty), ros.listen("/rosout", Log)
     program = SUPPORT / "programs/warns_often.py"

@@ -114,6 +114,26 @@ def test_target_without_a_stamp_after_stamped_ones_is_refused(left):
     assert len(left.commands.messages) == 1
 
 
+def test_target_after_a_late_one_does_not_jump(left):
+    """The late target reveals nothing of a clock: the next one is as much nearer to the present."""
+    left.send(0.0, 0.0, age_s=3.0)
+    left.send(0.001, 0.0, age_s=0.0)
+    assert all(each.is_safe for each in left.statuses.wait_for(2))
+    left.send(0.002, 0.0, age_s=-3.0)
+    assert "input: stamps jump by 3.0" in left.statuses.wait_for(3)[2].message
+
+
+def test_limiting_guard_follows_again_after_stamps_have_jumped(ros):
+    patient = {"checks": {"staleness": {"timeout_s": 60.0}}}
+    guard = GuardStation(ros, "/jumping", start_from="target", period_s=0.01, policy="limit", **patient)
+    guard.wait()
+    for k, age_s in enumerate((0.0, -3.0, -3.0)):
+        guard.send(0.0, 0.0, age_s=age_s)
+        guard.statuses.wait_for(k + 1)
+    assert [each.is_safe for each in guard.statuses.messages] == [True, False, True]
+    guard.close()
+
+
 def test_measured_states_of_other_joints_are_refused_with_their_names(module_ros, right):
     heard = Rosout(module_ros)
     other = JointState(name=["shoulder", "wrist"], position=[0.3, -0.2])

@@ -200,6 +200,7 @@ def test_faults_that_tf2_would_report_are_found_before(case):
 
 def test_invalid_tf_changes_nothing_and_does_not_flood_the_log(ros, node, tf_publisher):
     rosout = Rosout(ros)
+    rosout.wait_to_hear("/ros_pybullet_interface")
     tf = ros.listen("/tf", TFMessage)
     printed = ros.output(node).count("\n")
     began_s = time.monotonic()

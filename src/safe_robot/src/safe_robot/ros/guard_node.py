@@ -33,7 +33,7 @@ QUEUE_SIZE = 100
 WATCH_HZ = 100.0
 """Rate at which the node checks that targets still arrive [Hz]."""
 JUMP_S = 0.5
-"""A stamp jumps if it advances by more than the time since the previous target plus this value [s]."""
+"""A stamp jumps if it is after the previous target's arrival by more than the time since then plus this value [s]."""
 FIRST_STATE_S = 1.0
 """Longest wait for a measured state before the node subscribes to targets [s]."""
 BODIES_TIMEOUT_S = 0.5
@@ -57,7 +57,7 @@ class GuardNode:
         self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
         self._sent_s = self._repeated_s = NEVER_S
-        self._last_stamp: tuple[rospy.Time, float] | None = None
+        self._last_stamp: tuple[rospy.Time, float, float] | None = None
         self._target_topic = rospy.resolve_name("joint_states/target")
         self._command = rospy.Publisher(
             "joint_states/command",
@@ -176,14 +176,15 @@ class GuardNode:
             return self._guard.refuse("expected a stamp, as previous targets had")
         if stamp:
             age_s, now_s = (_now() - stamp).to_sec(), time.monotonic()
-            self._last_stamp = stamp, now_s
+            self._last_stamp = stamp, now_s, max(age_s, 0.0)
             if last is not None:
                 step_s = (stamp - last[0]).to_sec()
-                if step_s > now_s - last[1] + JUMP_S:
-                    self._last_stamp = last
+                _, arrival_s, late_s = last
+                if step_s - late_s > now_s - arrival_s + JUMP_S:
+                    self._last_stamp = None  # the next target need not follow either of the two
                     return self._guard.refuse(f"stamps jump by {step_s:g} s")
                 if step_s == 0.0:
-                    self._last_stamp, self._repeated_s, since_s = last, now_s, last[1]
+                    self._last_stamp, self._repeated_s, since_s = last, now_s, arrival_s
             if self._guard.last_command is None and age_s > self._silence_s:  # the command waited for a connection
                 return Decision(None, too_old(age_s, self._silence_s, "silence_s"))
         return self._guard.decide(values.position, self._measurements.context(since_s, age_s, step_s))

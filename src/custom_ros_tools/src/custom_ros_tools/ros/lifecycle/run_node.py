@@ -104,6 +104,9 @@ def run_node(
             sys.exit(1)
         except rospy.ROSInterruptException:
             return
+        except rospy.ROSException:
+            if not rospy.core.is_shutdown_requested():  # otherwise the node was publishing when its topics closed
+                raise
 
 
 def _wait_for_master() -> bool:
