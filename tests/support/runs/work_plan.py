@@ -66,6 +66,8 @@ EXTRA_OF = {
     "pyarrow": "data",
     "rosbags": "data",
     "ray": "farm",
+    "mkdocs": "site",
+    "py_mini_racer": "site",
 }
 """Extra that has a module."""
 

@@ -111,7 +111,7 @@ def test_the_page_on_speed_times_a_tick(tmp_path):
 
 
 def test_page_on_many_worlds_shows_true_output(tmp_path):
-    found = BLOCK.findall((ROOT / "docs/many_worlds.md").read_text())
+    found = BLOCK.findall((ROOT / "docs/replay_and_fork.md").read_text())
     elsewhere = ("rospy", "belt.world")  # in test_predict_service.py and test_foreign_states.py
     blocks = [block for block in found if not any(word in block for word in elsewhere)]
     assert len(blocks) == 5

@@ -120,7 +120,7 @@ class StaticFrame(ConfigModel):
 
 
 class ControlsConfig(ConfigModel):
-    """The window with buttons, see docs/controls.md."""
+    """The window with buttons, see docs/windows.md."""
 
     robot_name: Text | None = optional("Robot whose joints the window shows first. By default, the first robot.")
 
