@@ -1,0 +1,41 @@
+"""Pictures of the pages, each drawn by a function into docs/images."""
+
+from __future__ import annotations
+
+import pkgutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+IMAGES = Path(__file__).resolve().parents[2] / "docs/images"
+PICTURES: dict[str, str] = {}
+"""Functions that draw, as `module:function` in this folder, indexed by file name. Each takes the path of its file."""
+LONGEST_S = 900.0
+"""Longest time to draw a picture [s]."""
+
+
+def file_of(name: str) -> str:
+    """Returns the file name of a picture; the suffix is optional in `name`. Returns an empty string if unknown."""
+    return next((file for file in PICTURES if name in (file, Path(file).stem)), "")
+
+
+def draw(names: Sequence[str]) -> int:
+    """Draws pictures, each in its own process, and prints their sizes. Returns 1 if one fails, otherwise 0."""
+    failed = []
+    for file in map(file_of, names) if names else PICTURES:
+        path, began_s = IMAGES / file, time.monotonic()
+        command = [sys.executable, __file__, PICTURES[file], str(path)]
+        is_drawn = subprocess.run(command, timeout=LONGEST_S, check=False).returncode == 0
+        if is_drawn:
+            print(f"{path}: {path.stat().st_size / 1e3:.0f} kB, {time.monotonic() - began_s:.0f} s", flush=True)
+        else:
+            failed.append(file)
+    if failed:
+        print(f"not drawn: {', '.join(failed)}", file=sys.stderr)
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    pkgutil.resolve_name(sys.argv[1])(Path(sys.argv[2]))

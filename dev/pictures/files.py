@@ -1,0 +1,37 @@
+"""Small files for the pages: PNG with a palette, and moving GIF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PIL import Image
+
+MAX_MOVIE_BYTES = 3_000_000
+"""Largest size of a moving picture, so that pages load fast."""
+
+
+def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
+    """Writes a picture with a palette; a photograph with gradients needs all 256 colours."""
+    picture.convert("RGB").quantize(colours, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
+
+
+def write_gif(path: Path, frames: Sequence[Image.Image], hz: float, last_s: float = 1.5, colours: int = 128) -> None:
+    """Writes frames as a moving picture that repeats for ever.
+
+    Args:
+        path: The file.
+        frames: Frames of equal size.
+        hz: Frames per second.
+        last_s: Time for which the last frame stays [s].
+        colours: Number of colours, common to all frames.
+
+    Raises:
+        ValueError: If the file is larger than `MAX_MOVIE_BYTES`.
+    """
+    palette = frames[len(frames) // 2].convert("RGB").quantize(colours)
+    drawn = [each.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
+    durations_ms = [round(1e3 / hz)] * (len(drawn) - 1) + [round(1e3 * last_s)]
+    drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations_ms, loop=0, optimize=True)
+    if (size := path.stat().st_size) > MAX_MOVIE_BYTES:
+        raise ValueError(f"{path}: {size / 1e6:.1f} MB, limit {MAX_MOVIE_BYTES / 1e6:g} MB: fewer or smaller frames")
