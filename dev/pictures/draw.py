@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import signal
 import subprocess
 import sys
 import time
@@ -10,9 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs/images"
-PICTURES: dict[str, str] = {}
+PICTURES: dict[str, str] = {
+    "demo.png": "rviz_worlds:demo",
+}
 """Functions that draw, as `module:function` in this folder, indexed by file name. Each takes the path of its file."""
-LONGEST_S = 900.0
+LONGEST_S = 900
 """Longest time to draw a picture [s]."""
 
 
@@ -26,8 +29,8 @@ def draw(names: Sequence[str]) -> int:
     failed = []
     for file in map(file_of, names) if names else PICTURES:
         path, began_s = IMAGES / file, time.monotonic()
-        command = [sys.executable, __file__, PICTURES[file], str(path)]
-        is_drawn = subprocess.run(command, timeout=LONGEST_S, check=False).returncode == 0
+        with subprocess.Popen([sys.executable, __file__, PICTURES[file], str(path)]) as process:
+            is_drawn = process.wait() == 0
         if is_drawn:
             print(f"{path}: {path.stat().st_size / 1e3:.0f} kB, {time.monotonic() - began_s:.0f} s", flush=True)
         else:
@@ -37,5 +40,13 @@ def draw(names: Sequence[str]) -> int:
     return int(bool(failed))
 
 
+def _end(number: int, _: object) -> None:
+    """Handles a signal: raises SystemExit, so that all started programs end."""
+    sys.exit(f"not within {LONGEST_S} s" if number == signal.SIGALRM else 128 + number)
+
+
 if __name__ == "__main__":
+    signal.signal(signal.SIGALRM, _end)
+    signal.signal(signal.SIGTERM, _end)
+    signal.alarm(LONGEST_S)
     pkgutil.resolve_name(sys.argv[1])(Path(sys.argv[2]))

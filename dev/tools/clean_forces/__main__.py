@@ -152,11 +152,20 @@ def _save(figure: Any, axes: Any, path: Path) -> None:
     plt.close(figure)
 
 
+PICTURES = {
+    "clean_floor.png": floor_picture,
+    "clean_rate.png": rate_picture,
+    "clean_stiffness.png": stiffness_picture,
+    "clean_impedance.png": impedance_picture,
+    "clean_targets.png": targets_picture,
+    "clean_real_time.png": real_time_picture,
+}
+
+
 def main() -> None:
     """Draws all pictures into the folder of the command line."""
-    folder = Path(sys.argv[1])
-    for draw in (floor_picture, rate_picture, stiffness_picture, impedance_picture, targets_picture, real_time_picture):
-        draw(folder / f"clean_{draw.__name__.removesuffix('_picture')}.png")
+    for file, draw in PICTURES.items():
+        draw(Path(sys.argv[1]) / file)
 
 
 if __name__ == "__main__":
