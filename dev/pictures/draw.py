@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pkgutil
 import signal
 import subprocess
@@ -10,12 +11,25 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-IMAGES = Path(__file__).resolve().parents[2] / "docs/images"
+HERE = Path(__file__).resolve().parent
+IMAGES = HERE.parents[1] / "docs/images"
 PICTURES: dict[str, str] = {
     "demo.png": "rviz_worlds:demo",
+    "record_replay_fork.gif": "record_replay_fork:draw",
+    "architecture.svg": "diagrams:architecture",
+    "tick.svg": "diagrams:tick",
+    "episode_to_dataset.svg": "diagrams:episode_to_dataset",
+    "examples.png": "scenes:sheet",
+    "scene_cup.gif": "scenes:cup",
+    "scene_wiping.gif": "scenes:wiping",
+    "scene_handover.gif": "scenes:handover",
+    "scene_talos.gif": "scenes:talos",
+    "scene_factory.gif": "scenes:factory",
+    "scene_dual_arm.gif": "scenes:dual_arm",
+    "scene_clutter.gif": "scenes:clutter",
 }
 """Functions that draw, as `module:function` in this folder, indexed by file name. Each takes the path of its file."""
-LONGEST_S = 900
+LONGEST_S = 1800
 """Longest time to draw a picture [s]."""
 
 
@@ -27,9 +41,11 @@ def file_of(name: str) -> str:
 def draw(names: Sequence[str]) -> int:
     """Draws pictures, each in its own process, and prints their sizes. Returns 1 if one fails, otherwise 0."""
     failed = []
+    paths = HERE, HERE.parent / "benchmarks", os.environ.get("PYTHONPATH", "")
+    environment = {**os.environ, "PYTHONPATH": ":".join(map(str, paths))}  # forks of worlds import modules of HERE, too
     for file in map(file_of, names) if names else PICTURES:
         path, began_s = IMAGES / file, time.monotonic()
-        with subprocess.Popen([sys.executable, __file__, PICTURES[file], str(path)]) as process:
+        with subprocess.Popen([sys.executable, __file__, PICTURES[file], str(path)], env=environment) as process:
             is_drawn = process.wait() == 0
         if is_drawn:
             print(f"{path}: {path.stat().st_size / 1e3:.0f} kB, {time.monotonic() - began_s:.0f} s", flush=True)

@@ -9,6 +9,8 @@ from PIL import Image
 
 MAX_MOVIE_BYTES = 3_000_000
 """Largest size of a moving picture, so that pages load fast."""
+SAMPLES = 8
+"""Number of frames from which the common colours are taken."""
 
 
 def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
@@ -16,7 +18,14 @@ def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
     picture.convert("RGB").quantize(colours, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
 
 
-def write_gif(path: Path, frames: Sequence[Image.Image], hz: float, last_s: float = 1.5, colours: int = 128) -> None:
+def write_gif(
+    path: Path,
+    frames: Sequence[Image.Image],
+    hz: float,
+    last_s: float = 1.5,
+    colours: int = 128,
+    most_bytes: int = MAX_MOVIE_BYTES,
+) -> None:
     """Writes frames as a moving picture that repeats for ever.
 
     Args:
@@ -25,13 +34,18 @@ def write_gif(path: Path, frames: Sequence[Image.Image], hz: float, last_s: floa
         hz: Frames per second.
         last_s: Time for which the last frame stays [s].
         colours: Number of colours, common to all frames.
+        most_bytes: Largest size of the file.
 
     Raises:
-        ValueError: If the file is larger than `MAX_MOVIE_BYTES`.
+        ValueError: If the file is larger than `most_bytes`.
     """
-    palette = frames[len(frames) // 2].convert("RGB").quantize(colours)
+    samples = frames[:: max(1, len(frames) // SAMPLES)]
+    strip = Image.new("RGB", (frames[0].width, frames[0].height * len(samples)))
+    for number, sample in enumerate(samples):
+        strip.paste(sample, (0, number * sample.height))
+    palette = strip.quantize(colours)
     drawn = [each.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
     durations_ms = [round(1e3 / hz)] * (len(drawn) - 1) + [round(1e3 * last_s)]
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations_ms, loop=0, optimize=True)
-    if (size := path.stat().st_size) > MAX_MOVIE_BYTES:
-        raise ValueError(f"{path}: {size / 1e6:.1f} MB, limit {MAX_MOVIE_BYTES / 1e6:g} MB: fewer or smaller frames")
+    if (size := path.stat().st_size) > most_bytes:
+        raise ValueError(f"{path}: {size / 1e6:.1f} MB, limit {most_bytes / 1e6:g} MB: fewer or smaller frames")

@@ -6,21 +6,25 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pybullet
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
+
+from rpbi.images import looking_at
+from rpbi.render.camera import Intrinsics, view_matrix
+from rpbi.render.frame import Camera
+from rpbi.render.mirror import Mirror
+from rpbi.render.renderers import Renderer, open_renderer
+from rpbi.world.load_log import LoadLogReader
 
 if TYPE_CHECKING:
     from rpbi.world import World
 
 SUPERSAMPLING = 2
-LIGHT = (1.0, -1.5, 3.0)
-"""Direction towards the light, in the world's frame."""
-NEAR_M, FAR_M = 0.05, 20.0
+NEAR_M, FAR_M = 0.05, 40.0
 
 
 class Photographer:
-    """A pinhole camera that renders a world at its present tick.
+    """A pinhole camera that renders a world at its present tick, in a copy of the world, by OpenGL if possible.
 
     Args:
         position: Position of the camera, in the world's frame [m].
@@ -37,30 +41,31 @@ class Photographer:
         size: tuple[int, int] = (640, 480),
     ) -> None:
         self.size = size
-        self._view = pybullet.computeViewMatrix(position, target, (0.0, 0.0, 1.0))
-        self._lens = pybullet.computeProjectionMatrixFOV(fov_deg, size[0] / size[1], NEAR_M, FAR_M)
+        width, height = (SUPERSAMPLING * each for each in size)
+        self._pose, self._intrinsics = looking_at(position, target), Intrinsics(width, height, fov_deg, NEAR_M, FAR_M)
+        self._world: World | None = None
 
     def picture(self, world: World) -> Image.Image:
         """Returns a picture of the world."""
-        pb = next(iter(world.bodies.values())).pb
-        width, height = (SUPERSAMPLING * each for each in self.size)
-        colours = pb.getCameraImage(
-            width,
-            height,
-            self._view,
-            self._lens,
-            lightDirection=LIGHT,
-            shadow=1,
-            renderer=pybullet.ER_TINY_RENDERER,
-        )[2]
-        pixels = np.reshape(np.asarray(colours, dtype=np.uint8), (height, width, 4))
-        return Image.fromarray(pixels[:, :, :3]).reduce(SUPERSAMPLING)
+        if self._world is not world:
+            self._open(world)
+        for entry in self._unread.drain():
+            self._mirror.apply(entry)
+        self._mirror.show(body.state() for body in world.bodies.values())
+        drawing = self._renderer.draw(self._intrinsics, self._pose, False, self._mirror.transparent)
+        return Image.fromarray(np.ascontiguousarray(drawing.rgba[:, :, :3])).reduce(SUPERSAMPLING)
 
     def pixel(self, point: Sequence[float]) -> tuple[float, float]:
         """Returns column and row of a point of the world's frame [m] in the picture [px]."""
-        view, lens = (np.reshape(each, (4, 4)).T for each in (self._view, self._lens))
-        x, y, _, w = lens @ view @ (*point, 1.0)
+        x, y, _, w = self._intrinsics.projection @ view_matrix(self._pose) @ (*point, 1.0)
         return float((x / w + 1.0) / 2.0 * self.size[0]), float((1.0 - y / w) / 2.0 * self.size[1])
+
+    def _open(self, world: World) -> None:
+        if self._world is not None:
+            self._mirror.close()
+            self._renderer.pb.disconnect()
+        self._renderer: Renderer = open_renderer([Camera("photographer", "", self._intrinsics)])
+        self._mirror, self._unread, self._world = Mirror(self._renderer.pb), LoadLogReader(world.log), world
 
 
 def font(size_px: int, bold: bool = False) -> ImageFont.FreeTypeFont:
