@@ -277,9 +277,9 @@ class LivePlotWindow(QMainWindow):
 
     def _on_pause(self) -> None:
         self.canvas.pause()
-        self._pause.setText("Go on" if self.canvas.is_paused else "Pause")
+        self._pause.setText("Continue" if self.canvas.is_paused else "Pause")
         self._pause.setShortcut("Space")  # Qt removes the shortcut when the text changes
-        self._message.setText("paused" if self.canvas.is_paused else "goes on")
+        self._message.setText("paused" if self.canvas.is_paused else "continues")
 
     def _on_clear(self) -> None:
         self.canvas.clear()
