@@ -266,12 +266,12 @@ def wave(
     hand: Annotated[str, Argument("HAND", choices=lambda: ("left", "right"))] = "left",
     angle: Annotated[float, Argument("RAD", parse=number)] = 0.5,
 ) -> str:
-    """Waves at somebody.
+    """Waves at a person.
 
         ./rpbi wave Ada --hand right
 
     Args:
-        NAME: who is greeted
+        NAME: the greeted person
         hand: {choices}; left without it
         angle: how far [rad], or as 30deg
     """
@@ -498,9 +498,9 @@ def test_command_has_help_and_a_section_and_runs(workspace: Path) -> None:
     section = """\
     ./rpbi wave NAME [--hand HAND] [--angle RAD]
 
-Waves at somebody.
+Waves at a person.
 
-    NAME             who is greeted
+    NAME             the greeted person
     --hand HAND      left or right; left without it
     --angle RAD      how far [rad], or as 30deg
 
@@ -508,7 +508,7 @@ Waves at somebody.
 """
     assert f"\n## wave\n\n{section}\n## " in (workspace / "docs/commands.md").read_text()
     assert run(workspace, "./rpbi", "wave", "--help").stdout == section
-    assert re.search(r"^  wave +Waves at somebody\.$", run(workspace, "./rpbi").stdout, re.MULTILINE)
+    assert re.search(r"^  wave +Waves at a person\.$", run(workspace, "./rpbi").stdout, re.MULTILINE)
     console = [sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"), "wave"]
     assert run(workspace, *console, "--help").stdout == section
     done = run(workspace, *console, "Ada", "--hand", "right", "--angle", "-30deg")

@@ -34,13 +34,14 @@ _TAIL = f"""\
 
 In `~/.bashrc`, with the path of your checkout:
 
-```
+```shell
 source ~/rpbi/dev/tools/completion.bash
 ```
 
 `{PROGRAM} shell` has it already. It works for every checkout, called as `{PROGRAM}`, `rpbi` or by its path.
 
-```
+<!-- run by tests/test_completion.py -->
+```console
 $ {PROGRAM} lau<Tab> bas<Tab>_ku<Tab> real<Tab>0.5
 $ {PROGRAM} launch basic_example_kuka_lwr real_time_factor:=0.5
 ```

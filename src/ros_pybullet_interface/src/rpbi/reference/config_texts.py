@@ -6,7 +6,7 @@ INTRODUCTION = """\
 Every YAML file of a world and every key in it, with one page for each kind of file. For how to write worlds see
 [worlds.md](worlds.md), for their topics and services [topics_and_services.md](topics_and_services.md).
 
-```
+```shell
 ./rpbi check WORLD.yaml                  # all problems of a world at once, each with file, key and expected value
 ```
 

@@ -87,7 +87,7 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
     parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES.items())), FOLLOWED]
     parts += ["## Parameters", _parameters(), "## Other nodes", OTHERS, "## Messages and services of ours"]
     for name, text in definitions.items():
-        parts += [f"### {name}", block("", text)]
+        parts += [f"### {name}", block("text", text)]
     return page(parts)
 
 
