@@ -16,7 +16,7 @@ from typing import NamedTuple
 from page_blocks import ROOT, Block, blocks_in
 
 PYTHON = ROOT / ".venv/bin/python"
-_SHOWN = re.compile(r"^\s*print\(.*\)  # ([\dA-Z\[('\"{].*)$")
+_SHOWN = re.compile(r"^\s*print\(.*\)\s+# ([\dA-Z\[('\"{].*)$")
 _PROGRAM = """\
 import builtins, json, sys
 page, blocks, exclude = json.load(open("blocks.json"))
