@@ -1,4 +1,4 @@
-"""Every fenced block of the pages runs in a test, or says on the page why not; its commands exist with their options."""
+"""Every fenced block of the pages runs in a test, or says why not; its commands exist with their options."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def test_commands_of_all_blocks_exist_with_their_options():
 
 
 @pytest.mark.parametrize("page", RUN_HERE)
-def test_python_blocks_run_and_print_what_the_page_shows(page, tmp_path):
+def test_python_blocks_print_the_shown_output(page, tmp_path):
     blocks = [block for block in BLOCKS if block.page == page and block.language == "python" and not block.marks]
     run_blocks(blocks, tmp_path)
 

@@ -79,7 +79,9 @@ COUNTS = [
     Count("docs/example_robots.md", r"the (\w+) scenes at work", lambda: entries(SCENES)),
     Count("docs/ik.md", r"\[(\w+) solvers\]", lambda: entries("src/ik_ros/src/ik_ros/solvers/__init__.py")),
     Count("docs/gym.md", r"the (\w+) tasks in the first table", lambda: rows("docs/gym.md", "## Tasks")),
-    Count("docs/architecture.md", r"## (\w+) ways of data", lambda: rows("docs/architecture.md", "## Five ways of data")),
+    Count(
+        "docs/architecture.md", r"## (\w+) ways of data", lambda: rows("docs/architecture.md", "## Five ways of data")
+    ),
     Count("README.md", r"(\w+) more commands; ", lambda: commands_after("README.md", "more commands; ")),
 ]
 
@@ -109,7 +111,9 @@ def test_wrong_number_is_named(tmp_path):
 
 EXTRAS = {path.stem: path for path in (ROOT / "requirements/extras").glob("*.txt")}
 INSTALLATION = (ROOT / "docs/installation.md").read_text()
-SIZES = {name: float(size) for name, size in re.findall(r"^\| `(\w+)` \|.*\| ([\d,.]+) \|$", INSTALLATION, re.MULTILINE)}
+SIZES = {
+    name: float(size) for name, size in re.findall(r"^\| `(\w+)` \|.*\| ([\d,.]+) \|$", INSTALLATION, re.MULTILINE)
+}
 """Sizes of the extras on the page [MB]."""
 
 
@@ -136,7 +140,9 @@ def size_mb(package: Distribution) -> float:
 def test_the_page_has_every_extra_wherever_it_names_all():
     assert set(SIZES) == set(EXTRAS)
     for file in ("docs/installation.md", "docs/contributing.md"):
-        lists = [line.split() for line in re.findall(r"\./rpbi setup ((?:[a-z]+ ){5,}[a-z]+)", (ROOT / file).read_text())]
+        lists = [
+            line.split() for line in re.findall(r"\./rpbi setup ((?:[a-z]+ ){5,}[a-z]+)", (ROOT / file).read_text())
+        ]
         assert lists and all(set(names) == set(EXTRAS) for names in lists), file
 
 

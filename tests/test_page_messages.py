@@ -1,4 +1,4 @@
-"""Messages that the pages show are those of the code: most pairs of neighbouring words are in a string of the source."""
+"""Messages on the pages are those of the code: most pairs of neighbouring words are in a string of the source."""
 
 from __future__ import annotations
 

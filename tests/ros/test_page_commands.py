@@ -1,4 +1,4 @@
-"""The commands of the pages run, in the order of their page, and print what the page shows.
+"""The commands of the pages run, in the order of their page, and print the shown output.
 
 These are the blocks without a mark, or with the mark `in COMMAND`; see `page_blocks`.
 """
@@ -62,7 +62,9 @@ class Terminal:
                 continue
             printed = self._printed(command)
             assert "success: False" not in printed, f"{block}: {command}\n{printed}"
-            assert not shown or agree(shown, printed, "output varies" in block.marks), f"{block} shows {shown}\n{printed}"
+            assert not shown or agree(shown, printed, "output varies" in block.marks), (
+                f"{block} shows {shown}\n{printed}"
+            )
         self.stop()
 
     def launch(self, words: list[str]) -> None:
@@ -128,7 +130,7 @@ def home() -> Iterator[None]:
 @pytest.mark.thorough
 @pytest.mark.usefixtures("home")
 @pytest.mark.parametrize("page", PAGES)
-def test_commands_of_the_page_run_and_print_what_it_shows(ros: RosSystem, page: str) -> None:
+def test_commands_of_the_page_print_the_shown_output(ros: RosSystem, page: str) -> None:
     terminal = Terminal(ros, page)
     for block in BLOCKS:
         if block.page == page and not is_started_elsewhere(block):

@@ -53,13 +53,17 @@ class Block(NamedTuple):
     @property
     def marks(self) -> dict[str, str]:
         """Values of the parts of the mark, such as a reason or a file, indexed by kind."""
-        parts = (re.fullmatch(r"(not run|run by|part of|in|output varies|output)(?::? (.+))?", each) for each in self._parts)
+        parts = (
+            re.fullmatch(r"(not run|run by|part of|in|output varies|output)(?::? (.+))?", each) for each in self._parts
+        )
         return {part[1]: part[2] or "" for part in parts if part}
 
     @property
     def unknown_marks(self) -> list[str]:
         """Parts of the mark whose kind is unknown."""
-        return [each for each in self._parts if each.startswith(("run", "not", "part", "in ", "output"))][len(self.marks) :]
+        return [each for each in self._parts if each.startswith(("run", "not", "part", "in ", "output"))][
+            len(self.marks) :
+        ]
 
     @property
     def _parts(self) -> list[str]:

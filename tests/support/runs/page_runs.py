@@ -1,7 +1,7 @@
 """Runs the Python blocks of a page one after the other in one process, and compares what they print with the page.
 
-A comment behind a `print` is what this line prints if it begins with a digit, a capital letter, a bracket or a quotation
-mark; else it is a remark. `...` stands for any text.
+A comment behind a `print` is the output of this line if it begins with a digit, a capital letter, a bracket or a
+quotation mark; else it is a remark. `...` stands for any text.
 """
 
 from __future__ import annotations
@@ -49,9 +49,7 @@ class Printed(NamedTuple):
     text: str
 
 
-def run_blocks(
-    blocks: Sequence[Block], folder: Path, python: Path = PYTHON, exclude: Iterable[str] = ()
-) -> list[str]:
+def run_blocks(blocks: Sequence[Block], folder: Path, python: Path = PYTHON, exclude: Iterable[str] = ()) -> list[str]:
     """Runs blocks in an environment that knows nothing of the workspace, and compares their output with the page.
 
     Args:
