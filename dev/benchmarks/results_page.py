@@ -21,6 +21,7 @@ HEAD = """\
 
 Compare these figures with those of your computer:
 
+<!-- not run: takes minutes -->
 ```shell
 ./rpbi bench loop            # one benchmark; without a name, all that take less than some minutes
 ./rpbi bench loop --page     # also onto this page
