@@ -27,6 +27,14 @@ PAGES = sorted({block.page for block in BLOCKS})
 ENDLESS = re.compile(r"rostopic (echo (?!.*-n)|pub -r|hz)|rosbag record|rosrun (topic_tools throttle|custom_ros_tools)")
 """Commands that run until Ctrl-C."""
 ENDLESS_S = 4.0
+SHORTER = {
+    r"--seeds [\d-]+( \d+)*": "--seeds 1",
+    r"--count \d+": "--count 2",
+    r"--targets \d{2,}": "--targets 200",
+    r"--states \d+": "--states 5",
+    r"--climbs \d+": "--climbs 1",
+}
+"""What replaces the options of a command that takes minutes, by pattern."""
 STARTED_ELSEWHERE = (ROOT / "tests/ros/rpbi_examples/test_launch_starts.py").read_text()
 TICKS = 20
 SLOW_S = 120.0
@@ -57,6 +65,10 @@ class Terminal:
             self.launch(shlex.split(world)[2:])
         for command, shown in block.commands:
             words = shlex.split(command, comments=True)
+            if words[1:2] == ["setup"]:  # installs packages
+                continue
+            for pattern, option in SHORTER.items() if "shorter" in block.marks else ():
+                command = re.sub(pattern, option, command)
             if words[1:2] == ["launch"] and len(words) > 2:
                 self.launch(words[2:])
                 continue

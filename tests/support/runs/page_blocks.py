@@ -6,7 +6,7 @@ A comment on the line before a block is its mark. Parts of a mark are separated 
 - `run by FILE, ...`: the tests in these files run it.
 - `in COMMAND`: the commands need the world that another command launches.
 - `part of FILE`: an excerpt of that file.
-- `output`: the text that the Python blocks above print.
+- `shorter`: the test runs the commands with smaller numbers, such as one seed instead of a hundred.
 - `output varies`: the numbers of the output differ from run to run; only its other characters are compared.
 """
 
@@ -54,14 +54,14 @@ class Block(NamedTuple):
     def marks(self) -> dict[str, str]:
         """Values of the parts of the mark, such as a reason or a file, indexed by kind."""
         parts = (
-            re.fullmatch(r"(not run|run by|part of|in|output varies|output)(?::? (.+))?", each) for each in self._parts
+            re.fullmatch(r"(not run|run by|part of|in|shorter|output varies)(?::? (.+))?", each) for each in self._parts
         )
         return {part[1]: part[2] or "" for part in parts if part}
 
     @property
     def unknown_marks(self) -> list[str]:
         """Parts of the mark whose kind is unknown."""
-        return [each for each in self._parts if each.startswith(("run", "not", "part", "in ", "output"))][
+        return [each for each in self._parts if each.startswith(("run", "not", "part", "in ", "shorter", "output"))][
             len(self.marks) :
         ]
 
