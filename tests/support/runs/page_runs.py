@@ -72,7 +72,8 @@ def run_blocks(blocks: Sequence[Block], folder: Path, python: Path = PYTHON, exc
     done = subprocess.run(clean, cwd=folder, capture_output=True, text=True, timeout=300.0)
     assert done.returncode == 0, done.stderr
     printed = [Printed(*each) for each in json.loads((folder / "printed.json").read_text())]
-    assert wrong_outputs(blocks, printed) == []
+    wrong = wrong_outputs(blocks, printed)
+    assert not wrong, "\n".join(wrong)
     return ["".join(each.text for each in printed if each.block == index) for index in range(len(blocks))]
 
 
