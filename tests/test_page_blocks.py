@@ -278,7 +278,7 @@ def test_other_output_than_the_page_shows_is_named():
 
 def test_blocks_that_fail_or_print_something_else_fail(tmp_path):
     for text in ("print(2)  # 3\n", "1 / 0\n"):
-        with pytest.raises(AssertionError, match=r"a.md:2 shows '3', prints '2'|ZeroDivisionError"):
+        with pytest.raises(AssertionError, match=r"index.md:2 shows '3', prints '2'|ZeroDivisionError"):
             run_blocks(blocks_in(f"```python\n{text}```\n", "docs/index.md"), tmp_path)
 
 
