@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 SUPERSAMPLING = 2
 NEAR_M, FAR_M = 0.05, 40.0
+SKY = np.array((238, 242, 247), np.uint8)
+"""Colour where nothing is."""
 
 
 class Photographer:
@@ -53,7 +55,8 @@ class Photographer:
             self._mirror.apply(entry)
         self._mirror.show(body.state() for body in world.bodies.values())
         drawing = self._renderer.draw(self._intrinsics, self._pose, False, self._mirror.transparent)
-        return Image.fromarray(np.ascontiguousarray(drawing.rgba[:, :, :3])).reduce(SUPERSAMPLING)
+        colours = np.where(drawing.depth_buffer[:, :, None] < 1.0, drawing.rgba[:, :, :3], SKY).astype(np.uint8)
+        return Image.fromarray(colours).reduce(SUPERSAMPLING)
 
     def pixel(self, point: Sequence[float]) -> tuple[float, float]:
         """Returns column and row of a point of the world's frame [m] in the picture [px]."""

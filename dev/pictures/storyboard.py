@@ -38,14 +38,15 @@ def frame(steps: Sequence[str], step: int, picture: Image.Image, caption: str, r
 
 
 def titled(picture: Image.Image, title: str, border: str = "") -> Image.Image:
-    """Returns a copy of a picture with a title in its upper left corner, and a border in the colour `border`."""
+    """Returns a copy of a picture with a title in its lower left corner, and a border in the colour `border`."""
     copy = picture.copy()
     draw = ImageDraw.Draw(copy)
     if border:
         draw.rectangle((0, 0, copy.width - 1, copy.height - 1), outline=border, width=5)
-    left, top, right, bottom = draw.textbbox((14, 12), title, font(15, bold=True))
+    at = 14, copy.height - 30
+    left, top, right, bottom = draw.textbbox(at, title, font(15, bold=True))
     draw.rectangle((left - 5, top - 4, right + 5, bottom + 4), border or "white")
-    draw.text((14, 12), title, "white" if border else INK, font(15, bold=True))
+    draw.text(at, title, "white" if border else INK, font(15, bold=True))
     return copy
 
 
