@@ -27,6 +27,20 @@ PICTURES: dict[str, str] = {
     "scene_factory.gif": "scenes:factory",
     "scene_dual_arm.gif": "scenes:dual_arm",
     "scene_clutter.gif": "scenes:clutter",
+    "clean_floor.png": "clean_forces:draw_floor",
+    "clean_impedance.png": "clean_forces:draw_impedance",
+    "clean_rate.png": "clean_forces:draw_rate",
+    "clean_real_time.png": "clean_forces:draw_real_time",
+    "clean_stiffness.png": "clean_forces:draw_stiffness",
+    "clean_targets.png": "clean_forces:draw_targets",
+    "clutter_labels.png": "clutter_labels:draw_clutter_labels",
+    "forces.png": "figures:draw_forces",
+    "guard.png": "guard:draw_guard",
+    "human_interaction_press.png": "figures:draw_press",
+    "interpolation.png": "interpolation:draw_interpolation",
+    "pushing_mpc.png": "views:draw_pushing_mpc",
+    "real_robot.png": "views:draw_real_robot",
+    "wiping.png": "wiping:draw_wiping",
 }
 """Functions that draw, as `module:function` in this folder, indexed by file name. Each takes the path of its file."""
 LONGEST_S = 1800

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-import matplotlib.pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from PIL import Image  # noqa: E402
 
 X, Y, Z = "#d62728", "#2ca02c", "#1f77b4"
 """Colours of the axes x, y and z, as RViz has them: red, green, blue."""
@@ -16,22 +22,46 @@ STYLE = {
     "axes.grid": True,
     "axes.spines.right": False,
     "axes.spines.top": False,
+    "axes.titlesize": 11,
     "font.size": 11,
     "grid.alpha": 0.3,
+    "legend.frameon": False,
     "lines.linewidth": 1.6,
 }
 
 
-def new_figure(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9.0, 4.0)) -> tuple[Figure, list[Axes]]:
-    """Returns a figure of `size` inches in the style of the pages, and its axes row by row."""
+def new_figure(
+    rows: int = 1, columns: int = 1, size: tuple[float, float] = (9.0, 4.0), **subplots: Any
+) -> tuple[Figure, list[Axes]]:
+    """Returns a figure of `size` inches in the style of the pages, and its axes row by row.
+
+    `subplots` are further arguments of `matplotlib.pyplot.subplots`.
+    """
     plt.rcParams.update(STYLE)
-    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **subplots)
     return figure, list(axes.flat)
+
+
+def empty_figure(size: tuple[float, float]) -> Figure:
+    """Returns a figure of `size` inches in the style of the pages, without axes."""
+    plt.rcParams.update(STYLE)
+    return plt.figure(figsize=size, layout="constrained")
+
+
+def show(axes: Axes, picture: Image.Image) -> None:
+    """Shows a picture without ticks and frame."""
+    axes.imshow(picture)
+    axes.axis("off")
 
 
 def legend_beside(axes: Axes) -> None:
     """Puts the legend to the right of the data."""
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
+    """Puts the legend of one of the axes below the figure's plots."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
 
 
 def save(figure: Figure, path: Path) -> None:

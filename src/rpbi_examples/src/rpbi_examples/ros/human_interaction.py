@@ -161,7 +161,7 @@ class Watch:
     def _show(self) -> None:
         import matplotlib.pyplot as plt
 
-        figure = plt.figure("Human interaction", figsize=(7.0, 5.0))
+        figure = plt.figure("Human interaction", figsize=(9.0, 5.0), layout="constrained")
         while plt.fignum_exists(figure.number) and not rospy.is_shutdown() and not self._over.is_set():
             press = self._press
             recent = self._new_press()

@@ -17,7 +17,7 @@ from rpbi.world import World
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.pushing import GAP_M, PLACES, PUSH_SPEED, Pusher, ball_solver, next_push
 
-CONFIGS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs"
+CONFIGS = Path(__file__).resolve().parents[2] / "src/rpbi_examples/configs"
 TARGET_HZ = 50.0
 SETTLED_S = 0.5
 """Time after the first touch from which the push counts as steady [s]."""
