@@ -19,6 +19,8 @@ BEFORE, AFTER, INK = "#c0392b", "#e8731a", "#22333f"
 """Colours of a push without and with a setting, and of other quantities."""
 TOP_N = 25.0
 """Largest force in plots of whole pushes; first touches are higher [N]."""
+RUN_UP_M = 0.035
+"""Run-up with which the arm reaches the speed of the push before it touches the box [m]."""
 LATE_S, VERY_LATE_S = 0.015, 0.06
 """Largest delays of targets: less and more than the buffer hides [s]."""
 
@@ -29,9 +31,7 @@ def draw_floor(path: Path) -> None:
     figure, axes = new_figure(2, 2, (9.0, 5.0), sharex=True, height_ratios=(3, 1))
     for column, (name, force) in enumerate(forces.items()):
         above, below = axes[column], axes[2 + column]
-        above.plot(
-            force.time_s, force.friction, color=INK, lw=3.0, alpha=0.35, label="friction limit, mu N"
-        )
+        above.plot(force.time_s, force.friction, color=INK, lw=3.0, alpha=0.35, label="friction limit, mu N")
         above.plot(force.time_s, force.push, color=AFTER, lw=1.0, label="push of the arm")
         above.set(title=f"floor: {name}\n{_steady(force)}", ylim=(0.0, TOP_N))
         below.plot(force.time_s, force.points, color=INK, lw=1.0)
@@ -39,7 +39,7 @@ def draw_floor(path: Path) -> None:
         _mark_top(above, force)
     axes[0].set_ylabel("force [N]")
     axes[2].set_ylabel("contact points\nof the floor")
-    legend_below(figure, axes[0])
+    legend_below(figure, axes[0], 2)
     save(figure, path)
 
 
@@ -47,7 +47,7 @@ def draw_rate(path: Path) -> None:
     """Draws the first touch by length of the tick, and chattering forces by which of them are reported."""
     figure, (touch, chatter) = new_figure(1, 2, (9.6, 4.0))
     for colour, step_ms in zip((BEFORE, AFTER, INK), (1, 2, 4)):
-        force = pushed(step_ms / 1000.0, length_m=0.05)
+        force = pushed(step_ms / 1000.0, length_m=0.05, run_up_m=RUN_UP_M)
         label = f"timeStep {step_ms} ms: {force.push.max():.0f} N"
         touch.plot(_since_touch_ms(force), force.push, "o-", color=colour, ms=4, label=label)
     touch.set(xlim=(-10.0, 20.0), xlabel="time since the touch [ms]", ylabel="push of the arm [N]", title="first touch")
@@ -62,20 +62,22 @@ def draw_rate(path: Path) -> None:
         chatter.plot(force.time_s, force.push, label=name, **style)
     chatter.set(xlim=(1.0, 1.3), ylim=(0.0, 18.0), xlabel="time [s]", title="forces that chatter, on a plane")
     for axes in (touch, chatter):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17))
     save(figure, path)
 
 
 def draw_stiffness(path: Path) -> None:
     """Draws a push of a rigid box, and of one whose contacts give way."""
-    soft = pushed(objects={"box": COMPLIANT})
-    _draw_touch_and_push(path, {"rigid": pushed(), "contactStiffness: 1e4, contactDamping: 200": soft})
+    soft = pushed(objects={"box": COMPLIANT}, run_up_m=RUN_UP_M)
+    rigid = pushed(run_up_m=RUN_UP_M)
+    _draw_touch_and_push(path, {"rigid": rigid, "contactStiffness: 1e4, contactDamping: 200": soft})
 
 
 def draw_impedance(path: Path) -> None:
     """Draws a push under position control, and under impedance control."""
     modes = ("POSITION_CONTROL", "IMPEDANCE_CONTROL")
-    _draw_touch_and_push(path, {mode: pushed(objects={"kuka_lwr": _arm_keys(mode)}) for mode in modes})
+    forces = {mode: pushed(objects={"kuka_lwr": _arm_keys(mode)}, run_up_m=RUN_UP_M) for mode in modes}
+    _draw_touch_and_push(path, forces)
 
 
 def draw_targets(path: Path) -> None:
@@ -112,12 +114,14 @@ def _draw_touch_and_push(path: Path, forces: Mapping[str, Force]) -> None:
     for colour, (name, force) in zip((BEFORE, AFTER), forces.items()):
         label = f"{name}: first touch {force.push.max():.0f} N, then {_steady(force)}"
         touch.plot(_since_touch_ms(force), force.push, "o-", color=colour, ms=3, label=label)
-        push.plot(force.time_s, force.push, color=colour, lw=1.2)
-    touch.set(xlim=(-10.0, 60.0), xlabel="time since the touch [ms]", title="first touch at 0.15 m/s")
-    push.set(ylim=(0.0, 14.0), xlabel="time [s]", title="the whole push")
+        since_s = _since_touch_ms(force) / 1000.0
+        push.plot(since_s, force.friction, color=colour, lw=5.0, alpha=0.25)
+        push.plot(since_s, force.push, color=colour, lw=1.2)
+    touch.set(xlim=(-10.0, 60.0), xlabel="time since the touch [ms]", title="first touch")
+    touch.plot([], [], color="0.4", lw=5.0, alpha=0.35, label="friction limit of the floor, mu N")
+    push.set(xlim=(-0.1, None), ylim=(0.0, 10.0), xlabel="time since the touch [s]", title="the whole push")
     touch.set_ylabel("push of the arm [N]")
-    _mark_top(push, next(iter(forces.values())), 14.0)
-    legend_below(figure, touch, columns=1)
+    legend_below(figure, touch)
     save(figure, path)
 
 

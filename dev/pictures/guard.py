@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pybullet
 import yaml
 from matplotlib.axes import Axes
-from plots import BAD, GOOD, legend_below, new_figure, save, show
+from plots import BAD, GOOD, new_figure, save, show
 from render import Photographer
 
 from robot_model.collision.distances import Pair
@@ -33,7 +33,7 @@ MARGIN_M = 0.02
 TABLE_SIZE, TABLE_AT = (0.5, 0.8, 0.08), (-0.05, 0.0, 0.04)
 HOME = np.radians((0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0))
 AT_TABLE = HOME + np.radians((0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-SIZE_PX = (400, 360)
+SIZE_PX = (400, 380)
 
 
 class Motion(NamedTuple):
@@ -56,13 +56,13 @@ class Motion(NamedTuple):
 
 def draw_guard(path: Path) -> None:
     """Draws both motions without and with the guard, and the distances of the arm over time."""
-    figure, axes = new_figure(2, 3, (10.6, 6.2))
+    figure, axes = new_figure(2, 3, (10.6, 6.4), width_ratios=(1.0, 1.0, 1.05))
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder:
         main, robot = _write_world(Path(folder)), RobotModel(LWR)
         judge = _new_guard(robot, main)
         for row, motion in enumerate(_motions(judge)):
             for column, guard in enumerate((None, _new_guard(robot, main))):
-                word, colour = ("with the guard", GOOD) if guard else ("without the guard", BAD)
+                word, colour = ("with guard", GOOD) if guard else ("without guard", BAD)
                 world = World.from_file(main, connection_mode=pybullet.DIRECT)
                 q = _drive(world, guard, motion.goal, robot.joint_names)
                 image = axes[3 * row + column]
@@ -71,27 +71,28 @@ def draw_guard(path: Path) -> None:
                 world.close()
                 _draw_distance(axes[3 * row + 2], _distances_mm(judge, q, motion), word, colour)
             _finish(axes[3 * row + 2], motion)
-    legend_below(figure, axes[-1])
     save(figure, path)
 
 
 def _draw_distance(axes: Axes, distance_mm: Array, word: str, colour: str) -> None:
     time_s = PERIOD_S * np.arange(len(distance_mm))
-    axes.plot(time_s, distance_mm, color=colour, label=word)
+    axes.plot(time_s, distance_mm, color=colour, lw=2.2)
     end_mm = distance_mm[-1]
     axes.annotate(
-        f"{end_mm:.0f} mm" if abs(end_mm) > 0.5 else "0 mm", (time_s[-1], end_mm), (4, 0), color=colour, fontsize=12,
-        textcoords="offset points", va="center", annotation_clip=False,
+        f"{end_mm:.0f} mm", (time_s[-1], end_mm), (4, 0), color=colour, fontsize=12, textcoords="offset points",
+        va="center", annotation_clip=False,
     )  # fmt: skip
     print(f"{word}: nearest {distance_mm.min():.2f} mm, at last {end_mm:.2f} mm")
 
 
 def _finish(axes: Axes, motion: Motion) -> None:
-    axes.axhline(1e3 * MARGIN_M, color="black", linestyle=":", label="margin of the guard")
+    margin_mm = 1e3 * MARGIN_M
+    axes.axhline(margin_mm, color="black", linestyle=":")
+    axes.text(1.5, margin_mm + 4.0, f"margin: {margin_mm:.0f} mm", fontsize=10)
     axes.axhspan(-40.0, 0.0, color=BAD, alpha=0.1, lw=0)
     axes.text(0.1, -35.0, "collision", color=BAD, fontsize=10)
     axes.set(xlabel="time [s]", ylabel="distance [mm]", xlim=(0.0, SHOWN_S), ylim=(-40.0, 120.0))
-    axes.set_title(f"distance of the arm from {motion.other}")
+    axes.set_title(f"distance from {motion.other}")
 
 
 def _write_world(folder: Path) -> str:
@@ -129,8 +130,8 @@ def _new_guard(robot: RobotModel, world: str) -> Guard:
 
 
 def _motions(judge: Guard) -> tuple[Motion, Motion]:
-    at_table = Photographer((-0.25, -0.75, 0.30), (0.02, 0.0, 0.17), 38.0, SIZE_PX)
-    at_base = Photographer((0.15, -1.35, 0.65), (0.50, 0.0, 0.22), 36.0, SIZE_PX)
+    at_table = Photographer((-0.2, -0.9, 0.16), (0.03, 0.0, 0.15), 22.0, SIZE_PX)
+    at_base = Photographer((0.0, -0.62, 0.38), (0.46, -0.05, 0.06), 30.0, SIZE_PX)
     return (
         Motion("at the table", "the table", AT_TABLE, Environment, at_table),
         Motion("into itself", "itself", _folded(judge), SelfCollision, at_base),

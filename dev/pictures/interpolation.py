@@ -28,7 +28,8 @@ CONFIGS = Path(__file__).resolve().parents[2] / "src/rpbi_examples/configs"
 MOTION, SOLVER = CONFIGS / "interpolation/traj_lwr.yaml", CONFIGS / "kuka_lwr_ik_example/kdl.yaml"
 PERIOD_S, AFTER_S = 0.01, 1.0
 """Time between two targets, and time for which the motion is watched after the last ball [s]."""
-CAMERA = Photographer((-1.55, -0.75, 0.85), (-0.28, 0.18, 0.30), 36.0, (560, 600))
+CAMERA = Photographer((-1.0, 1.25, 0.70), (-0.30, 0.10, 0.33), 33.0, (640, 600))
+OFFSETS_PX = {"green": (-110.0, 20.0), "blue": (20.0, -20.0), "red": (24.0, 14.0)}
 COLOURS = {"green": "#17804a", "blue": "#2659d9", "red": "#d92e20"}
 
 
@@ -39,9 +40,9 @@ def draw_interpolation(path: Path) -> None:
     view = Overlay(CAMERA, CAMERA.picture(world))
     view.line([tuple(row[2]) for row in rows], "#e67814", 4.0)
     view.dot(tuple(waypoints[:, 0]), "#22333f")
-    view.words(tuple(waypoints[:, 0]), "start, 0 s")
+    view.words(tuple(waypoints[:, 0]), "start, 0 s", offset_px=(-30, 26))
     for visit in VISITS:
-        view.words(visit.position, f"{visit.colour}, {visit.time_s:g} s", COLOURS[visit.colour], (22, 0))
+        view.words(visit.position, f"{visit.colour}, {visit.time_s:g} s", COLOURS[visit.colour], OFFSETS_PX[visit.colour])
     world.close()
     figure = empty_figure((10.6, 5.2))
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.25))

@@ -59,9 +59,11 @@ def legend_beside(axes: Axes) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
-    """Puts the legend of one of the axes below the figure's plots."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
+def legend_below(figure: Figure, axes: Axes, columns: int = 1) -> None:
+    """Puts the legend of one of the axes below all plots of the figure."""
+    legend = figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=columns)
+    share = legend.get_window_extent().height / figure.bbox.height
+    figure.get_layout_engine().set(rect=(0.0, share, 1.0, 1.0 - share))
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -15,7 +15,7 @@ import yaml
 from rpbi.samples import ContactsSample
 from rpbi.world import World
 from rpbi_examples.motions import PlanarPose
-from rpbi_examples.pushing import GAP_M, PLACES, PUSH_SPEED, Pusher, ball_solver, next_push
+from rpbi_examples.pushing import CLEARANCE_M, GAP_M, PLACES, PUSH_SPEED, Pusher, ball_solver, next_push
 
 CONFIGS = Path(__file__).resolve().parents[2] / "src/rpbi_examples/configs"
 TARGET_HZ = 50.0
@@ -78,7 +78,11 @@ def example(folder: Path, time_step_s: float = 0.001, **objects: Mapping[str, An
 
 
 def push(
-    world: World, target_hz: float = TARGET_HZ, late_s: Callable[[], float] = lambda: 0.0, length_m: float = 0.3
+    world: World,
+    target_hz: float = TARGET_HZ,
+    late_s: Callable[[], float] = lambda: 0.0,
+    length_m: float = 0.3,
+    run_up_m: float = 0.0,
 ) -> Force:
     """Pushes the box by the arm along a straight line at constant speed, PUSH_SPEED.
 
@@ -87,6 +91,8 @@ def push(
         target_hz: Targets of the joints in a second.
         late_s: Returns how late the next target is [s].
         length_m: Length of the push [m].
+        run_up_m: Distance of the ball from its usual start at which it starts, at most `CLEARANCE_M - GAP_M` [m]. The
+            usual start is `GAP_M` before the box.
     """
     solver = ball_solver()
     base = world.bodies["kuka_lwr"].base_pose()
@@ -94,20 +100,24 @@ def push(
     planned = next_push(PlanarPose(x, y, 2.0 * math.atan2(quat[2], quat[3])), PLACES[0])
     assert planned is not None  # the box of the example is not there yet
     positions = list(world.bodies["kuka_lwr"].joint_positions().values())
-    *before, along, _, _ = Pusher(solver).moves(positions, planned)
-    whole_m = math.dist(planned.start, planned.end) + GAP_M
+    *before, approach, along, _, _ = Pusher(solver).moves(positions, planned)
+    approach_m, whole_m = CLEARANCE_M - GAP_M, math.dist(planned.start, planned.end) + GAP_M
     ticks = round(1.0 / (TARGET_HZ * world.config.timeStep))
-    for move in before:
+    start = 1.0 - run_up_m / approach_m
+    for move in (*before, approach._replace(path=lambda way: approach.path(way * start))):
         for number in range(1, round(move.duration_s * TARGET_HZ) + 1):
             _send(world, solver.joint_names, move.at(number / TARGET_HZ))
             _steps(world, ticks)
-    count = round(length_m / PUSH_SPEED * target_hz)
+    whole_s = (run_up_m + length_m) / PUSH_SPEED
+    count = round(whole_s * target_hz)
     dues = [number / target_hz + late_s() for number in range(count)]
-    ways = [number / target_hz * PUSH_SPEED / whole_m for number in range(1, count + 1)]
+    ways_m = [number / target_hz * PUSH_SPEED - run_up_m for number in range(1, count + 1)]
     found, number = [], 0
-    for tick in range(round(length_m / PUSH_SPEED / world.config.timeStep)):
+    for tick in range(round(whole_s / world.config.timeStep)):
         while number < count and dues[number] <= (tick + 1e-6) * world.config.timeStep:
-            _send(world, solver.joint_names, along.path(ways[number]).tolist())
+            way_m = ways_m[number]
+            path = along.path(way_m / whole_m) if way_m > 0.0 else approach.path(1.0 + way_m / approach_m)
+            _send(world, solver.joint_names, path.tolist())
             number += 1
         found += [(tick * world.config.timeStep, *forces) for forces in _steps(world, 1)]
     return Force(*np.array(found).T)

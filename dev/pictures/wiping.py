@@ -22,7 +22,7 @@ TABLE_AT = (-0.04, 0.0, 0.03)
 FORCE_N, SHOWN_S = 20.0, 9.0
 METRES_A_NEWTON = 0.012
 """Length of the arrow for each newton [m]."""
-CAMERA = Photographer((-0.95, -0.95, 0.62), (0.10, 0.0, 0.20), 34.0, (600, 560))
+CAMERA = Photographer((-0.85, -0.85, 0.55), (0.03, 0.0, 0.19), 31.0, (600, 540))
 
 
 class Touch(NamedTuple):
@@ -54,17 +54,12 @@ def draw_wiping(path: Path) -> None:
 
 def _draw_force(axes: Any, touches: Sequence[Touch]) -> None:
     touched_s = next(each.time_s for each in touches if each.force_n > 0.0)
-    wipes_s = touched_s + SETTLING_S
     axes.plot([each.time_s for each in touches], [each.force_n for each in touches], color="#d62728")
     axes.axhline(FORCE_N, color="0.3", lw=1.0, ls="--")
-    axes.text(0.1, FORCE_N + 0.4, f"force: {FORCE_N:g} N, as configured", color="0.3")
-    for begin_s, end_s, word in (
-        (0.0, touched_s, "moves\ndown"),
-        (touched_s, wipes_s, "rests"),
-        (wipes_s, SHOWN_S, "wipes"),
-    ):
-        axes.axvline(end_s, color="0.6", lw=1.0, ls=":")
-        axes.text((begin_s + end_s) / 2.0, 2.0, word, ha="center", color="0.3")
+    axes.text(SHOWN_S - 0.1, FORCE_N + 1.0, f"configured: {FORCE_N:g} N", color="0.3", ha="right")
+    for begin_s, end_s, word in ((0.0, touched_s, "moves\ndown"), (touched_s + SETTLING_S, SHOWN_S, "wipes")):
+        axes.axvline(begin_s, color="0.6", lw=1.0, ls=":")
+        axes.text((begin_s + end_s) / 2.0, 9.0, word, ha="center", color="0.3")
     axes.set(xlabel="time [s]", ylabel="force of the table on the tip [N]", xlim=(0.0, SHOWN_S), ylim=(0.0, 26.0))
 
 

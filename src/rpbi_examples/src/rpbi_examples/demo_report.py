@@ -75,7 +75,7 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
         axis.set_ylim((low + high) / 2.0 - half, (low + high) / 2.0 + half)
         axis.grid(alpha=0.3)
     axes[-1, 0].set_xlabel("simulated time [s]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    axes[-1, 0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.5), ncols=2, frameon=False)
     _save(figure, path, "Joint positions and their targets")
 
 

@@ -38,11 +38,11 @@ def draw_motion(
     for index, (style, name) in enumerate(((PLAN, "plan"), (TIP, "tip")), 1):
         places = np.array([row[index] for row in rows])
         for axis, place, colour in zip("xyz", places.T, (RED, GREEN, BLUE)):
-            upper.plot(seconds, place, color=colour, label=f"{axis}, {name}", **style)
+            upper.plot(seconds, place, color=colour, label=axis if name == "tip" else None, **style)
         speed = np.linalg.norm(np.gradient(places, seconds, axis=0), axis=1)
         lower.plot(seconds, speed, color="0.15", label=name, **style)
-    for place in waypoints:
-        upper.plot(times_s, place, "o", color="0.15", ms=6, label="waypoints" if place is waypoints[0] else None)
+    upper.plot(times_s, waypoints[0], "o", color="0.15", label="waypoints")
+    upper.plot(times_s, waypoints[1:].T, "o", color="0.15")
     upper.set(ylabel="position [m]")
     lower.set(ylabel="speed [m/s]", xlabel="time [s]", ylim=(0.0, None))
     for axes in (upper, lower):

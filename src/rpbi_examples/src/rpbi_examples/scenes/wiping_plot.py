@@ -46,7 +46,9 @@ def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
     axes.axhline(scene.force, color="0.5", lw=1, ls="--", label=f"requested: {scene.force:.1f} N")
     if scene.stamps:
         axes.plot(ways_along(scene.stamps), scene.forces, color=BLUE, label=f"mean: {np.mean(scene.forces):.2f} N")
-    axes.set(xlabel="distance along the path [m]", ylabel="normal force [N]", ylim=(0.8 * scene.force, 1.2 * scene.force))
+    axes.set(
+        xlabel="distance along the path [m]", ylabel="normal force [N]", ylim=(0.8 * scene.force, 1.2 * scene.force)
+    )
     axes.margins(x=0.01)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
 
