@@ -42,7 +42,8 @@ def draw_interpolation(path: Path) -> None:
     view.dot(tuple(waypoints[:, 0]), "#22333f")
     view.words(tuple(waypoints[:, 0]), "start, 0 s", offset_px=(-30, 26))
     for visit in VISITS:
-        view.words(visit.position, f"{visit.colour}, {visit.time_s:g} s", COLOURS[visit.colour], OFFSETS_PX[visit.colour])
+        words, colour = f"{visit.colour}, {visit.time_s:g} s", COLOURS[visit.colour]
+        view.words(visit.position, words, colour, OFFSETS_PX[visit.colour])
     world.close()
     figure = empty_figure((10.6, 5.2))
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.25))
