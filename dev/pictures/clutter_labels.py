@@ -18,7 +18,7 @@ from rpbi_data.labels.bop import SCENE
 from rpbi_data.labels.dataset import write_labelled_images
 
 WORLD = "{rpbi_examples}/configs/clutter/config.yaml"
-SEED = 3
+SEED = 7
 FINE = 2
 """Rows and columns of the image for each of the picture."""
 WIDTH, HEIGHT = 1120, 840
