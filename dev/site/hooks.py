@@ -19,6 +19,8 @@ LINK_OUT = re.compile(r"\]\(\.\./((?:src|tests|dev)/[^)\s#]+)\)")
 """A link to a file of the repository outside docs."""
 FILE_AS_TEXT = re.compile(r"\[`?(\w+\.md)`?\]\(")
 """A link whose text is the file name of a page."""
+MARK = re.compile(r"^ *<!-- .* -->\n(?= *```)", re.MULTILINE)
+"""A comment before a block, for the tests; MkDocs would end a list with it."""
 
 LOG = logging.getLogger("mkdocs.hooks.site")
 MIRROR = tempfile.TemporaryDirectory(prefix="site-api-")
@@ -51,11 +53,11 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
-    """Applies `extra.search`, gives links the headings of pages as texts, and points links out of docs to copies."""
+    """Applies `extra.search`, replaces texts and targets of links, and removes the marks of blocks."""
     search = config.extra["search"]
     page.meta["search"] = {"boost": search["boost"].get(page.file.src_uri, 1)}
     page.meta["tags"] = search["words"].get(page.file.src_uri, [])
-    named = FILE_AS_TEXT.sub(lambda match: f"[{heading(config, match[1])}](", markdown)
+    named = FILE_AS_TEXT.sub(lambda match: f"[{heading(config, match[1])}](", MARK.sub("", markdown))
     return LINK_OUT.sub(r"](files/\1)", named)
 
 
