@@ -167,7 +167,7 @@ use_machine() {
   fi
   if [[ $with_tests ]]; then
     offline=
-    timed "./rpbi setup ik mpc tags data gym html assets notebook farm site" at_checkout "./rpbi setup ik mpc tags data gym html assets notebook farm site"
+    timed "./rpbi setup ik mpc tags data gym html assets notebook farm site wheel" at_checkout "./rpbi setup ik mpc tags data gym html assets notebook farm site wheel"
     offline=yes
     timed "./rpbi test ${tests[*]}, without network" at_checkout "./rpbi test ${tests[*]}"
     report+=("$kind: $(used_mb) MB of disk with all extras")

@@ -68,6 +68,8 @@ EXTRA_OF = {
     "ray": "farm",
     "mkdocs": "site",
     "py_mini_racer": "site",
+    "hatchling": "wheel",
+    "vermin": "wheel",
 }
 """Extra that has a module."""
 

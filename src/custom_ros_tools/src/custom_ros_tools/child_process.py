@@ -1,13 +1,28 @@
-"""Starts child processes that end with their parent, and kills processes together with their children."""
+"""Commands of child processes, start with an end together with the parent, and kill together with all children."""
 
 import contextlib
 import fcntl
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+_WITHOUT_FOLDER = "import runpy, sys; del sys.path[0]; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
+"""Runs the module that the first argument names."""
+
+
+def python_module(name: str, *words: str) -> list[str]:
+    """Returns the command that runs a module by this Python; files of the current folder hide no module.
+
+    Args:
+        name: Full name of the module.
+        words: Arguments of the module.
+    """
+    start = ["-P", "-m"] if sys.version_info >= (3, 11) else ["-c", _WITHOUT_FOLDER]
+    return [sys.executable, *start, name, *words]
 
 
 def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) -> subprocess.Popen[bytes]:

@@ -10,13 +10,12 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.child_process import python_module, start_child
 from robot_model.mesh_cache import cache_folder, content_hash
 
 TRIAL = 3
@@ -115,7 +114,7 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
         The latter has no meaning if the process finished all meshes.
     """
     reading, writing = os.pipe()
-    command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
+    command = python_module(__name__.rpartition(".")[0], str(writing))
     with open(reading, "rb") as report:
         try:
             process = start_child(
