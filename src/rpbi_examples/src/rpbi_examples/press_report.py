@@ -173,7 +173,7 @@ class Press:
         lower.plot(times_s, [1e3 * each.target_z for each in self.samples], "--", color="0.35", label="its target")
         low_mm, touch_mm = lower.get_ylim()[0], 1e3 * self._touch_height
         lower.axhspan(low_mm, touch_mm, color="tab:brown", alpha=0.15, lw=0, label="tool in the box")
-        lower.margins(y=0.0)
+        lower.set_ylim(bottom=low_mm)
         lower.set_ylabel("height [mm]")
         lower.set_xlabel("time [s]")
         for axes in (upper, lower):
