@@ -28,7 +28,7 @@ CONFIGS = Path(__file__).resolve().parents[2] / "src/rpbi_examples/configs"
 MOTION, SOLVER = CONFIGS / "interpolation/traj_lwr.yaml", CONFIGS / "kuka_lwr_ik_example/kdl.yaml"
 PERIOD_S, AFTER_S = 0.01, 1.0
 """Time between two targets, and time for which the motion is watched after the last ball [s]."""
-CAMERA = Photographer((-1.0, 1.25, 0.70), (-0.30, 0.10, 0.33), 33.0, (640, 600))
+CAMERA = Photographer((-1.0, 1.25, 0.70), (-0.27, 0.10, 0.37), 37.0, (600, 600))
 OFFSETS_PX = {"green": (-110.0, 20.0), "blue": (20.0, -20.0), "red": (24.0, 14.0)}
 COLOURS = {"green": "#17804a", "blue": "#2659d9", "red": "#d92e20"}
 
@@ -46,7 +46,7 @@ def draw_interpolation(path: Path) -> None:
         view.words(visit.position, words, colour, OFFSETS_PX[visit.colour])
     world.close()
     figure = empty_figure((10.6, 5.2))
-    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.25))
+    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.2))
     show(left.subplots(), view.picture())
     draw_motion(right, rows, times_s, waypoints)
     save(figure, path)

@@ -54,8 +54,8 @@ class Photographer:
         for entry in self._unread.drain():
             self._mirror.apply(entry)
         self._mirror.show(body.state() for body in world.bodies.values())
-        drawing = self._renderer.draw(self._intrinsics, self._pose, False, self._mirror.transparent)
-        colours = np.where(drawing.depth_buffer[:, :, None] < 1.0, drawing.rgba[:, :, :3], SKY).astype(np.uint8)
+        drawing = self._renderer.draw(self._intrinsics, self._pose, True, self._mirror.transparent)
+        colours = np.where(drawing.body_ids[:, :, None] >= 0, drawing.rgba[:, :, :3], SKY).astype(np.uint8)
         return Image.fromarray(colours).reduce(SUPERSAMPLING)
 
     def pixel(self, point: Sequence[float]) -> tuple[float, float]:
