@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 MAX_MOVIE_BYTES = 3_000_000
@@ -16,6 +17,17 @@ SAMPLES = 8
 def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
     """Writes a picture with a palette; a photograph with gradients needs all 256 colours."""
     picture.convert("RGB").quantize(colours, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
+
+
+def common_palette(frames: Sequence[Image.Image], colours: int) -> Image.Image:
+    """Returns a palette for frames, in which small coloured things have their colours, too.
+
+    Each colour counts by the square root of its number of pixels.
+    """
+    pixels = np.concatenate([np.asarray(frame.convert("RGB")).reshape(-1, 3) for frame in frames])
+    found, counts = np.unique(pixels >> 2 << 2, axis=0, return_counts=True)
+    weighted = np.repeat(found, np.ceil(np.sqrt(counts)).astype(int), axis=0)
+    return Image.fromarray(weighted[None]).quantize(colours)
 
 
 def write_gif(
@@ -39,11 +51,7 @@ def write_gif(
     Raises:
         ValueError: If the file is larger than `most_bytes`.
     """
-    samples = frames[:: max(1, len(frames) // SAMPLES)]
-    strip = Image.new("RGB", (frames[0].width, frames[0].height * len(samples)))
-    for number, sample in enumerate(samples):
-        strip.paste(sample, (0, number * sample.height))
-    palette = strip.quantize(colours)
+    palette = common_palette(frames[:: max(1, len(frames) // SAMPLES)], colours)
     drawn = [each.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
     durations_ms = [round(1e3 / hz)] * (len(drawn) - 1) + [round(1e3 * last_s)]
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations_ms, loop=0, optimize=True)

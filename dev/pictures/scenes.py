@@ -35,7 +35,7 @@ class View(NamedTuple):
         target: Point in the middle of the picture [m].
         fov_deg: Vertical field of view [deg].
         start_s: Time of the first frame [s].
-        end_s: Time of the last frame [s].
+        end_s: Time after which no frame follows, if the scene has not ended before [s].
         still_s: Time of the picture in the sheet [s].
         speed: Simulated seconds per second of the moving picture.
     """
@@ -44,21 +44,21 @@ class View(NamedTuple):
     target: Vector
     fov_deg: float = 40.0
     start_s: float = 0.0
-    end_s: float = 0.0
+    end_s: float = 90.0
     still_s: float = 0.1
     speed: float = 1.0
 
 
 SCENES = {
-    "cup": View((1.55, 0.35, 1.25), (0.25, 0.2, 0.72), 32.0, 1.0, 26.0, 6.0, 4.0),
-    "wiping": View((0.8, 1.0, 0.95), (0.05, 0.0, 0.25), 36.0, 1.0, 17.0, 8.0, 3.0),
-    "handover": View((1.95, -1.9, 1.6), (0.55, -0.15, 1.05), 34.0, 0.0, 24.0, 8.0, 4.0),
-    "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 0.0, 9.0, 3.96, 1.5),
-    "factory": View((1.3, 0.0, 1.6), (0.3, 0.0, 0.95), 42.0, 2.0, 50.0, 16.0, 6.0),
-    "dual_arm": View((2.2, 1.2, 1.5), (0.3, 0.0, 0.6), 36.0, 0.0, 12.0, 5.0, 2.0),
+    "cup": View((1.6, 0.2, 1.75), (0.29, 0.2, 0.71), 34.0, 1.0, speed=3.0, still_s=6.0),
+    "wiping": View((0.8, 1.0, 0.95), (0.05, 0.0, 0.29), 38.0, 1.0, speed=2.5, still_s=8.0),
+    "handover": View((1.95, -1.9, 1.6), (0.6, -0.15, 1.17), 31.0, speed=4.0, still_s=9.0),
+    "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 1.0, 7.0, 3.96, 0.75),
+    "factory": View((1.2, 0.3, 1.7), (0.36, 0.02, 0.95), 39.0, 2.0, speed=4.0, still_s=12.0),
+    "dual_arm": View((2.2, 1.2, 1.5), (0.33, 0.05, 0.6), 32.0, speed=1.5, still_s=5.0),
 }
 """Views of the scenes."""
-CLUTTER = View((0.60, -0.52, 1.00), (0.0, 0.0, 0.42), 42.0, 0.0, 2.4, 3.0, 0.5)
+CLUTTER = View((0.60, -0.52, 1.00), (0.0, 0.0, 0.46), 46.0, end_s=2.0, still_s=3.0, speed=0.5)
 ROBOTS = {
     "kuka_lwr": View((1.6, -1.5, 1.3), (0.35, 0.0, 0.4), 34.0),
     "dual_iiwa": View((2.0, -1.2, 1.5), (0.2, 0.0, 0.7), 40.0),
@@ -117,10 +117,12 @@ def movie(name: str, path: Path) -> None:
     view, film = (CLUTTER, observed) if name == "clutter" else (SCENES[name], filmed)
     times_s = np.arange(view.start_s, view.end_s, view.speed / HZ).tolist()
     pictures = film(name, view, SIZE_PX, times_s)
-    speed = f"{view.speed:g} x" if view.speed >= 1.0 else f"1/{1.0 / view.speed:g} x"
+    speed = f"{view.speed:g} x speed"
     for picture in pictures:
-        draw = ImageDraw.Draw(picture)
-        draw.text((SIZE_PX[0] - 10, SIZE_PX[1] - 10), speed, "#1f2937", font(15, bold=True), "rs")
+        draw, corner = ImageDraw.Draw(picture), (SIZE_PX[0] - 10, SIZE_PX[1] - 10)
+        left, top, right, bottom = draw.textbbox(corner, speed, font(15), "rb")
+        draw.rectangle((left - 5, top - 3, right + 5, bottom + 3), "white")
+        draw.text(corner, speed, "#1f2937", font(15), "rb")
     write_gif(path, pictures, HZ, most_bytes=MAX_SCENE_BYTES)
 
 
