@@ -41,6 +41,12 @@ PICTURES: dict[str, str] = {
     "pushing_mpc.png": "views:draw_pushing_mpc",
     "real_robot.png": "views:draw_real_robot",
     "wiping.png": "wiping:draw_wiping",
+    "clutter_rviz.png": "rviz_worlds:clutter_rviz",
+    "rgbd_cloud.png": "rviz_worlds:rgbd_cloud",
+    "ik_drag.png": "rviz_worlds:ik_drag",
+    "dual_iiwa.png": "rviz_worlds:dual_iiwa",
+    "lfd_rviz.png": "rviz_worlds:lfd_rviz",
+    "tutorial_rviz.png": "rviz_worlds:tutorial_rviz",
 }
 """Functions that draw, as `module:function` in this folder, indexed by file name. Each takes the path of its file."""
 LONGEST_S = 1800
@@ -55,8 +61,9 @@ def file_of(name: str) -> str:
 def draw(names: Sequence[str]) -> int:
     """Draws pictures, each in its own process, and prints their sizes. Returns 1 if one fails, otherwise 0."""
     failed = []
-    paths = HERE, HERE.parent / "benchmarks", os.environ.get("PYTHONPATH", "")
-    environment = {**os.environ, "PYTHONPATH": ":".join(map(str, paths))}  # forks of worlds import modules of HERE, too
+    # Forks of worlds import modules of HERE, too. Packages come first, since some benchmarks have names of packages.
+    paths = os.environ.get("PYTHONPATH", ""), HERE, HERE.parent / "benchmarks"
+    environment = {**os.environ, "PYTHONPATH": ":".join(map(str, paths))}
     for file in map(file_of, names) if names else PICTURES:
         path, began_s = IMAGES / file, time.monotonic()
         with subprocess.Popen([sys.executable, __file__, PICTURES[file], str(path)], env=environment) as process:

@@ -22,7 +22,8 @@ def rviz_content(
 
     Args:
         config: The `.rviz` file.
-        displays: Properties that replace those of displays, or None to remove the display, indexed by its name.
+        displays: Properties that replace those of displays, or None to remove the display, indexed by its name. A
+            display with the property `Class` is added.
         view: Properties of the view that replace those of the file.
         scale: Factor of the sizes that RViz has in pixels.
 
@@ -37,6 +38,8 @@ def rviz_content(
     for name, properties in displays.items():
         if properties is None:
             del shown[name]
+        elif "Class" in properties:
+            shown[name] = {"Name": name, "Enabled": True, "Value": True, **properties}
         else:
             shown[name].update(properties)
     for each in shown.values():

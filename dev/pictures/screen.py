@@ -17,7 +17,9 @@ import rosgraph
 import rospy
 import yaml
 from PIL import Image, ImageChops, ImageGrab
+from rviz.srv import SendFilePath
 from rviz_view import rviz_content
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.child_process import kill_with_children
@@ -27,11 +29,15 @@ T = TypeVar("T")
 
 SUPERSAMPLING = 2
 """Rows and columns of the screen for each row and column of the picture."""
-PATIENCE_S = 180.0
+PATIENCE_S = 400.0
 """Longest wait for a window or a state [s]."""
 POLL_S = 0.1
-STILL_S = 2.0
-"""Time without a change after which a window counts as drawn [s]; software draws a frame of RViz in up to 1 s."""
+ATTEMPTS, OPENS_S = 3, 60.0
+"""Number of starts of RViz, and longest time until it draws [s]."""
+STILL_S = 4.0
+"""Time without a change after which a window counts as drawn [s]."""
+FRAMES, SETTLING_FRAMES = 3, 30
+"""Number of RViz's frames between two looks at the screen, and after its start, while it connects to all topics."""
 STOP_S = 30.0
 """Longest wait for the end of a program after SIGINT [s]."""
 COLOURS = 50
@@ -68,6 +74,22 @@ def next_message(topic: str, kind: type, condition: Callable[[Any], bool] = lamb
         subscriber.unregister()
 
 
+class Latest:
+    """The latest message of a topic.
+
+    Args:
+        topic: Name of the topic.
+        kind: Type of its messages.
+    """
+
+    def __init__(self, topic: str, kind: type) -> None:
+        self.message: Any = None
+        self._subscriber = rospy.Subscriber(topic, kind, self._store, queue_size=1)
+
+    def _store(self, message: Any) -> None:
+        self.message = message
+
+
 def call(service: str) -> None:
     """Calls a service without arguments as soon as it is there."""
     rospy.wait_for_service(service, PATIENCE_S)
@@ -88,6 +110,7 @@ class Stage:
     def __init__(self, width: int = 1280, height: int = 800, scale: int = SUPERSAMPLING) -> None:
         self.width, self.height, self.scale = width, height, scale
         self._exits = ExitStack()
+        self._saved: list[Path] = []
 
     def __enter__(self) -> Stage:
         """Starts the screen and the master."""
@@ -127,14 +150,15 @@ class Stage:
         """Starts a launch file without RViz; see `rviz`."""
         return self.start(["roslaunch", package, name, "rviz:=false", *arguments])
 
-    def rviz(
-        self, config: Path, displays: Mapping[str, Mapping[str, Any] | None] | None = None, **view: Any
-    ) -> subprocess.Popen[bytes]:
+    def rviz(self, config: Path, displays: Mapping[str, Mapping[str, Any] | None] | None = None, **view: Any) -> None:
         """Opens RViz over the whole screen with only its 3-D view, and waits until it draws.
+
+        Debian's RViz sometimes crashes or hangs while it starts; then it is started again.
 
         Args:
             config: The `.rviz` file.
-            displays: Properties that replace those of displays, or None to remove the display, indexed by its name.
+            displays: Properties that replace those of displays, or None to remove the display, indexed by its name. A
+                display with the property `Class` is added.
             view: Properties of the view that replace those of the file, with `_` for spaces, such as `Distance=1.5`
                 [m] or `Focal_Point={"X": 0.0, "Y": 0.0, "Z": 0.5}` [m].
         """
@@ -149,9 +173,17 @@ class Stage:
         folder = self._exits.enter_context(tempfile.TemporaryDirectory())
         path = Path(folder) / "view.rviz"
         path.write_text(yaml.safe_dump(content), encoding="utf-8")
-        process = self.start(["rviz", "--fullscreen", "--splash-screen", "", "-d", str(path)])
-        wait_until(lambda: len(self.picture().getcolors(1 << 24) or ()) > COLOURS, "RViz draws")
-        return process
+        self._saved = [Path(folder) / "saved.rviz"]
+        for attempt in range(1, ATTEMPTS + 1):
+            process = self.start(["rviz", "--fullscreen", "--splash-screen", "", "-d", path, "__name:=rviz"])
+            try:
+                wait_until(lambda: len(self.picture().getcolors(1 << 24) or ()) > COLOURS, "RViz draws", OPENS_S)
+                break
+            except TimeoutError:
+                if attempt == ATTEMPTS:
+                    raise
+                _stop(process)
+        self._let_rviz_work(SETTLING_FRAMES)
 
     def stop_world(self, namespace: str = "") -> None:
         """Stops the simulation, so that windows show one tick."""
@@ -167,6 +199,7 @@ class Stage:
 
         def is_still() -> bool:
             nonlocal before, since_s
+            self._let_rviz_work(FRAMES)
             now = self.picture()
             if ImageChops.difference(now, before).getbbox():
                 before, since_s = now, time.monotonic()
@@ -174,6 +207,12 @@ class Stage:
 
         wait_until(is_still, "the screen stands still")
         return before
+
+    def _let_rviz_work(self, frames: int) -> None:
+        """Waits for some frames of RViz, if it is open: its services answer between frames."""
+        for path in self._saved * frames:
+            rospy.wait_for_service("rviz/save_config", PATIENCE_S)
+            rospy.ServiceProxy("rviz/save_config", SendFilePath)(String(str(path)))
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:

@@ -31,6 +31,10 @@ BLUE = [0.1, 0.1, 0.9, 1.0]
 
 BALL_RADIUS_M = 0.2
 CORNERS_M = [[-0.2, -0.2, 0.0], [0.2, -0.2, 0.0], [0.0, 0.2, 0.0]]
+FIRST_GLASS = {  # has the body id of the image that is drawn to try EGL
+    "name": "more_glass",
+    "createVisualShape": {"shapeType": "GEOM_BOX", "halfExtents": [0.3, 0.3, 0.01], "rgbaColor": [0.1, 0.9, 0.1, 0.5]},
+}
 PLANE = {"name": "plane", "createVisualShape": {"shapeType": "GEOM_PLANE", "planeNormal": [0.0, 0.0, 1.0]}}
 TRIANGLE = {
     "name": "triangle",
@@ -60,12 +64,11 @@ def make_world(folder: Path) -> World:
     return World.from_file(
         worlds.write_world(
             folder,
-            visual=(PLANE, TRIANGLE),
+            visual=(FIRST_GLASS, PLANE, TRIANGLE),
             collision=(worlds.FLOOR,),
             dynamic=(
                 worlds.ball("ball", BALL_RADIUS_M),
                 coloured_box("glass", [0.9, 0.1, 0.1, 0.25], (0.3, 0.3, 0.01)),
-                coloured_box("more_glass", [0.1, 0.9, 0.1, 0.5], (0.3, 0.3, 0.01)),
                 coloured_box("hidden", [1.0, 1.0, 1.0, 0.0]),
                 coloured_box("red", RED),
                 coloured_box("blue", BLUE),
