@@ -14,11 +14,6 @@ SAMPLES = 8
 """Number of frames from which the common colours are taken."""
 
 
-def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
-    """Writes a picture with a palette; a photograph with gradients needs all 256 colours."""
-    picture.convert("RGB").quantize(colours, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
-
-
 def common_palette(frames: Sequence[Image.Image], colours: int) -> Image.Image:
     """Returns a palette for frames, in which small coloured things have their colours, too.
 
@@ -28,6 +23,12 @@ def common_palette(frames: Sequence[Image.Image], colours: int) -> Image.Image:
     found, counts = np.unique(pixels >> 2 << 2, axis=0, return_counts=True)
     weighted = np.repeat(found, np.ceil(np.sqrt(counts)).astype(int), axis=0)
     return Image.fromarray(weighted[None]).quantize(colours)
+
+
+def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
+    """Writes a picture with a palette; a photograph with gradients needs all 256 colours."""
+    palette = common_palette([picture], colours)
+    picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
 
 
 def write_gif(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -66,7 +65,7 @@ ROBOTS = {
     "kinova": View((1.1, -1.1, 0.9), (0.0, 0.0, 0.4), 34.0),
     "talos": View((2.4, -1.6, 1.7), (0.0, 0.0, 0.95), 40.0),
     "nextage": View((1.7, -1.1, 1.7), (0.0, 0.0, 1.0), 40.0),
-    "mobile_base": View((0.3, -1.9, 1.2), (-0.9, 0.0, 0.2), 36.0),
+    "mobile_base": View((0.3, -1.9, 1.2), (-0.72, 0.0, 0.3), 42.0),
     "human_model": View((2.6, -1.6, 1.6), (0.0, 0.0, 0.95), 38.0),
 }
 """Views of the robots of the basic examples."""
@@ -126,10 +125,42 @@ def movie(name: str, path: Path) -> None:
     write_gif(path, pictures, HZ, most_bytes=MAX_SCENE_BYTES)
 
 
-cup, wiping, handover, talos, factory, dual_arm, clutter = (partial(movie, name) for name in (*SCENES, "clutter"))
+def draw_cup(path: Path) -> None:
+    """Writes the moving picture of the scene `cup`."""
+    movie("cup", path)
 
 
-def sheet(path: Path) -> None:
+def draw_wiping(path: Path) -> None:
+    """Writes the moving picture of the scene `wiping`."""
+    movie("wiping", path)
+
+
+def draw_handover(path: Path) -> None:
+    """Writes the moving picture of the scene `handover`."""
+    movie("handover", path)
+
+
+def draw_talos(path: Path) -> None:
+    """Writes the moving picture of the scene `talos`."""
+    movie("talos", path)
+
+
+def draw_factory(path: Path) -> None:
+    """Writes the moving picture of the scene `factory`."""
+    movie("factory", path)
+
+
+def draw_dual_arm(path: Path) -> None:
+    """Writes the moving picture of the scene `dual_arm`."""
+    movie("dual_arm", path)
+
+
+def draw_clutter(path: Path) -> None:
+    """Writes the moving picture of the world `clutter`."""
+    movie("clutter", path)
+
+
+def draw_sheet(path: Path) -> None:
     """Writes the sheet of the robots of the basic examples, and of the scenes at work."""
     robots = {f"basic_example_{name}": (observed, view) for name, view in ROBOTS.items()}
     scenes = {name: (filmed, view) for name, view in SCENES.items()} | {"clutter": (observed, CLUTTER)}
