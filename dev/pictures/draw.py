@@ -47,6 +47,15 @@ PICTURES: dict[str, str] = {
     "dual_iiwa.png": "rviz_worlds:dual_iiwa",
     "lfd_rviz.png": "rviz_worlds:lfd_rviz",
     "tutorial_rviz.png": "rviz_worlds:tutorial_rviz",
+    "avatar_walking.png": "rviz_people:avatar_walking",
+    "guard_rviz.png": "rviz_people:guard_rviz",
+    "human_interaction.png": "rviz_people:human_interaction",
+    "teleop.png": "rviz_people:teleop",
+    "telepresence.png": "rviz_people:telepresence",
+    "tracking.png": "rviz_people:tracking",
+    "controls.png": "windows:controls",
+    "devices.png": "windows:devices",
+    "live_plot.png": "windows:live_plot",
 }
 """Functions that draw, as `module:function` in this folder, indexed by file name. Each takes the path of its file."""
 LONGEST_S = 1800
