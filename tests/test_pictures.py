@@ -34,9 +34,11 @@ NO_SCRIPT = frozenset(
 
 
 def functions(file: Path) -> set[str]:
-    """Returns the names of a module's functions."""
+    """Returns the names that a module gives to functions, by definition or by assignment."""
     tree = ast.parse(file.read_text()) if file.exists() else ast.Module([], [])
-    return {each.name for each in tree.body if isinstance(each, ast.FunctionDef)}
+    targets = [target for each in tree.body if isinstance(each, ast.Assign) for target in each.targets]
+    assigned = {node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)}
+    return assigned | {each.name for each in tree.body if isinstance(each, ast.FunctionDef)}
 
 
 def without_function(pictures: Mapping[str, str], folder: Path) -> list[str]:
@@ -71,9 +73,11 @@ def test_each_picture_has_a_function():
 
 
 def test_a_picture_without_a_function_is_found(tmp_path):
-    (tmp_path / "renders.py").write_text("def cup(path): ...\nplate = cup\n")
-    table = {"cup.png": "renders:cup", "plate.png": "renders:plate", "fork.png": "windows:fork"}
-    assert without_function(table, tmp_path) == ["plate.png", "fork.png"]
+    (tmp_path / "renders.py").write_text("def cup(path):\n    spoon = path\n\nplate, glass = cup, cup\n")
+    (tmp_path / "windows.py").touch()
+    table = {"cup.png": "renders:cup", "glass.png": "renders:glass"}
+    wrong = {"spoon.png": "renders:spoon", "fork.png": "windows:fork", "knife.png": "plots:knife"}
+    assert without_function({**table, **wrong}, tmp_path) == list(wrong)
 
 
 def test_each_picture_is_used():
@@ -118,3 +122,19 @@ def test_a_world_is_rendered():
         return red > 2 * blue
 
     assert picture.size == (160, 120) and is_orange(box) and not is_orange(floor)
+
+
+def test_rviz_shows_no_panels_in_pictures(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    rviz_content = runpy.run_path(str(FOLDER / "rviz_view.py"))["rviz_content"]
+    config = ROOT / "src/rpbi_examples/rviz/clutter.rviz"
+    content = rviz_content(
+        config, {"TF": None, "World": {"Alpha": 0.5}, "Path": {"Class": "rviz/Path"}}, {"Yaw": 1.0}, 2
+    )
+    manager = content["Visualization Manager"]
+    displays = {each["Name"]: each for each in manager["Displays"]}
+    assert content["Panels"] == [] and displays.keys() == {"Grid", "World", "Coloured point cloud", "Path"}
+    assert displays["Coloured point cloud"]["Size (Pixels)"] == 4, "twice that of the file"
+    assert displays["World"]["Alpha"] == 0.5 and manager["Views"]["Current"]["Yaw"] == 1.0
+    with pytest.raises(KeyError, match="Wrld"):
+        rviz_content(config, {"Wrld": {"Alpha": 0.5}}, {})
