@@ -20,14 +20,10 @@ NO_SCRIPT = frozenset(
         "ik_talos.png",
         "lfd_pipeline.png",
         "mvn.png",
-        "pushing_cycles.png",
-        "pushing_errors.png",
-        "pushing_path.png",
         "streams.png",
         "talos_push.png",
         "tutorial_colour.png",
         "tutorial_path.png",
-        "wiping_force.png",
     }
 )
 """Images that no script in dev draws again; a new image needs a script instead of a line here."""

@@ -1,4 +1,4 @@
-"""Pictures that reports of the product draw: forces of the demo, and a press with the hand on a haptic device."""
+"""Pictures that reports of examples draw: forces of the demo, a press by a haptic device, a push and wiping."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pandas as pd
 from screen import PATIENCE_S, Stage
@@ -18,8 +18,12 @@ from rpbi.world import World
 from rpbi_examples.demo_report import plot_forces
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.pushing import PLACES, Pusher, ball_solver, next_push
+from rpbi_examples.scenes.task import SceneTask, make_env, run_episode
+from rpbi_examples.scenes.wiping import Wiping
+from rpbi_examples.scenes.wiping_plot import draw as draw_wiping
 
 DEMO = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
+WIPING_SEED = 212
 TARGET_HZ = 50.0
 FRICTION = 0.7
 """Friction coefficient of box and floor."""
@@ -56,6 +60,21 @@ def draw_press(path: Path) -> None:
         arguments = ("device:=scripted", "headless:=true", f"output:={folder}")
         stage.launch("human_interaction.launch", *arguments).wait(PATIENCE_S)
         shutil.copyfile(Path(folder) / "human_interaction.png", path)
+
+
+def draw_pushing_report(path: Path) -> None:
+    """Draws one of the pictures that the example `pushing_mpc` writes at the end of a push, by the name of the file."""
+    with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
+        stage.launch("pushing_mpc.launch", "headless:=true", f"out:={folder}").wait(PATIENCE_S)
+        shutil.copyfile(Path(folder) / path.name.removeprefix("pushing_"), path)
+
+
+def draw_wiping_force(path: Path) -> None:
+    """Draws force and wiped area of an episode of the scene `wiping`, as docs/example_wiping.md has it."""
+    env = make_env("wiping")
+    result = run_episode(env, WIPING_SEED)
+    draw_wiping(cast(Wiping, cast(SceneTask, env.task).scene), result, f"wiping, seed {WIPING_SEED}", path)
+    env.close()
 
 
 def _pushes(world: World) -> Iterator[dict[str, float]]:

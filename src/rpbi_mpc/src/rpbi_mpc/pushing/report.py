@@ -105,7 +105,7 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
         axes.plot(*outline.T, color="tab:orange", alpha=0.45, lw=1)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     _legend_beside(axes)
-    figure.savefig(file, dpi=120)
+    figure.savefig(file, dpi=120, bbox_inches="tight")
 
 
 def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], controller: PushingController) -> None:
@@ -114,15 +114,15 @@ def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], c
     along_m = table["path_time_s"].clip(upper=controller.path.duration_s) * controller.config.path.speed
     turned = table["state.yaw"] - table["reference_yaw"]
     axes[0].plot(along_m, 1e3 * table["error_m"], color="tab:orange")
-    axes[0].set(ylabel="position [mm]", ylim=(0.0, None))
+    axes[0].set(ylabel="position error [mm]", ylim=(0.0, None))
     axes[1].plot(along_m, np.degrees(np.arctan2(np.sin(turned), np.cos(turned))), color="tab:orange")
     axes[1].axhline(0.0, color="0.6", lw=1)
-    axes[1].set(ylabel="yaw [deg]")
+    axes[1].set(ylabel="yaw error [deg]")
     for ahead_s, colour in zip(AHEAD_S, ("tab:blue", "tab:cyan")):
         then = table[["state.x", "state.y"]].shift(-round(ahead_s / controller.config.cycle_s)).to_numpy()
         missed = then - np.array([_predicted(cycle, ahead_s) for cycle in cycles])
         axes[2].plot(along_m, 1e3 * np.hypot(*missed.T), color=colour, label=f"{ahead_s:g} s ahead")
-    axes[2].set(ylabel="prediction [mm]", xlabel="along the path [m]", ylim=(0.0, None))
+    axes[2].set(ylabel="prediction error [mm]", xlabel="along the path [m]", ylim=(0.0, None))
     _legend_beside(axes[2])
     figure.savefig(file, dpi=120)
 
