@@ -526,7 +526,7 @@ def test_first_image_of_a_renderer_equals_the_following_ones(tmp_path):
 
 
 def test_large_image_has_depths_everywhere_behind_glass():
-    """PyBullet draws at most 1024 x 768 pixels and enlarges them; depths with transparent shapes are read separately."""
+    """PyBullet enlarges images of 1024 x 768 pixels; depths with transparent shapes are read separately."""
     large = Intrinsics(width_px=1280, height_px=900, near_m=0.1, far_m=10.0)
     renderer = open_renderer([Camera("large", "", large)])
     pb = renderer.pb
@@ -535,7 +535,8 @@ def test_large_image_has_depths_everywhere_behind_glass():
         shape = pb.createVisualShape(pb.GEOM_BOX, halfExtents=half_extents, rgbaColor=rgba)
         body_id = pb.createMultiBody(0.0, -1, shape, [0.0, 0.0, z_m])
     plain = renderer.draw(large, Pose()).depth_buffer
-    glass = renderer.draw(large, Pose(), transparent=(TransparentShape(body_id, -1, 0, tuple(rgba)),)).depth_buffer
+    transparent = (TransparentShape(body_id, -1, 0, tuple(rgba)),)
+    glass = renderer.draw(large, Pose(), transparent=transparent).depth_buffer
     assert (glass < 1.0).all() and np.abs(glass - plain).max() > 0.01  # the glass is nearer than the wall
     left, upper = (slice(None), slice(0, 300)), (slice(0, 200), slice(None))
     assert np.array_equal(glass[left], plain[left]) and np.array_equal(glass[upper], plain[upper])
