@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,28 @@ SKY = np.array((238, 242, 247), np.uint8)
 """Colour where nothing is."""
 
 
+@dataclass(frozen=True)
+class Tile(Intrinsics):
+    """One of `SUPERSAMPLING` x `SUPERSAMPLING` parts of an image, since PyBullet draws at most 1024 x 768 pixels.
+
+    Attributes:
+        column: Column of the part, from the left.
+        row: Row of the part, from the top.
+    """
+
+    column: int = 0
+    row: int = 0
+
+    @property
+    def projection(self) -> np.ndarray:
+        """The projection matrix of the whole image, with this part enlarged to the whole clip space."""
+        matrix = super().projection
+        last = SUPERSAMPLING - 1
+        matrix[0] = SUPERSAMPLING * matrix[0] + (last - 2 * self.column) * matrix[3]
+        matrix[1] = SUPERSAMPLING * matrix[1] - (last - 2 * self.row) * matrix[3]
+        return matrix
+
+
 class Photographer:
     """A pinhole camera that renders a world at its present tick, in a copy of the world, by OpenGL if possible.
 
@@ -42,9 +65,8 @@ class Photographer:
         fov_deg: float = 40.0,
         size: tuple[int, int] = (640, 480),
     ) -> None:
-        self.size = size
-        width, height = (SUPERSAMPLING * each for each in size)
-        self._pose, self._intrinsics = looking_at(position, target), Intrinsics(width, height, fov_deg, NEAR_M, FAR_M)
+        self.size, self._fov_deg = size, fov_deg
+        self._pose, self._intrinsics = looking_at(position, target), Intrinsics(*size, fov_deg, NEAR_M, FAR_M)
         self._world: World | None = None
 
     def picture(self, world: World) -> Image.Image:
@@ -54,9 +76,15 @@ class Photographer:
         for entry in self._unread.drain():
             self._mirror.apply(entry)
         self._mirror.show(body.state() for body in world.bodies.values())
-        drawing = self._renderer.draw(self._intrinsics, self._pose, True, self._mirror.transparent)
-        colours = np.where(drawing.body_ids[:, :, None] >= 0, drawing.rgba[:, :, :3], SKY).astype(np.uint8)
+        tiles = range(SUPERSAMPLING)
+        colours = np.vstack([np.hstack([self._tile(column, row) for column in tiles]) for row in tiles])
         return Image.fromarray(colours).reduce(SUPERSAMPLING)
+
+    def _tile(self, column: int, row: int) -> np.ndarray:
+        """Returns one of `SUPERSAMPLING` x `SUPERSAMPLING` parts, which has the size of the picture."""
+        tile = Tile(*self.size, self._fov_deg, NEAR_M, FAR_M, column, row)
+        drawing = self._renderer.draw(tile, self._pose, True, self._mirror.transparent)
+        return np.where(drawing.body_ids[:, :, None] >= 0, drawing.rgba[:, :, :3], SKY).astype(np.uint8)
 
     def pixel(self, point: Sequence[float]) -> tuple[float, float]:
         """Returns column and row of a point of the world's frame [m] in the picture [px]."""
