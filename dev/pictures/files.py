@@ -10,6 +10,8 @@ from PIL import Image
 
 MAX_MOVIE_BYTES = 3_000_000
 """Largest size of a moving picture, so that pages load fast."""
+NEARLY_WHITE = 245
+"""Colours whose red, green and blue are larger become white."""
 SAMPLES = 8
 """Number of frames from which the common colours are taken."""
 
@@ -17,18 +19,23 @@ SAMPLES = 8
 def common_palette(frames: Sequence[Image.Image], colours: int) -> Image.Image:
     """Returns a palette for frames, in which small coloured things have their colours, too.
 
-    Each colour counts by the square root of its number of pixels.
+    Each colour counts by the square root of its number of pixels. White stays white, as the page around the picture.
     """
     pixels = np.concatenate([np.asarray(frame.convert("RGB")).reshape(-1, 3) for frame in frames])
-    found, counts = np.unique(pixels >> 2 << 2, axis=0, return_counts=True)
+    rounded = (pixels.astype(np.uint16) + 2) // 5 * 5
+    found, counts = np.unique(rounded.astype(np.uint8), axis=0, return_counts=True)
     weighted = np.repeat(found, np.ceil(np.sqrt(counts)).astype(int), axis=0)
-    return Image.fromarray(weighted[None]).quantize(colours)
+    palette = Image.fromarray(weighted[None]).quantize(colours)
+    entries = np.reshape(palette.getpalette(), (-1, 3))
+    entries[entries.min(axis=1) > NEARLY_WHITE] = 255
+    palette.putpalette(entries.ravel().tolist())
+    return palette
 
 
 def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
     """Writes a picture with a palette; a photograph with gradients needs all 256 colours."""
     palette = common_palette([picture], colours)
-    picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
+    picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def write_gif(

@@ -210,7 +210,7 @@ def middle(picture: Image.Image) -> Image.Image:
 
 def forked_and_executed(world: World, pushes: Sequence[Targets]) -> Iterator[Image.Image]:
     """Tries pushes in forks, and executes the one whose box gets nearest to the mark. Yields the frames."""
-    caption = f"{len(pushes)} copies of the running world try a push each. Which one brings the box to the mark?"
+    caption = "Four copies of the running world try a push each. Which one brings the box to the mark?"
     forks = world.fork(len(pushes))
     for turn in zip(*map(parts, pushes)):
         ends: list[Shot] = [fork.call(advance_fork, part) for fork, part in zip(forks, turn)]
