@@ -51,7 +51,7 @@ def test_sections_that_are_left_out_exist():
     assert command.CHECKS in (ROOT / "requirements/base.txt").read_text()
 
 
-def test_control_file_has_version_and_the_python_that_was_built_for(workspace):
+def test_control_file_has_version_and_python(workspace):
     text = command.control(workspace, "amd64")
     assert f"Version: {version(workspace)}\nArchitecture: amd64\n" in text
     assert "Depends: python3 (>= 3.11), python3 (<< 3.12), ffmpeg, python3-rospy, rosbash\n" in text

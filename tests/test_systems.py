@@ -39,7 +39,7 @@ def test_missing_release_file_is_refused(tmp_path):
     assert check(tmp_path / "none").stderr.startswith(f"{REFUSAL}this system.")
 
 
-def test_debian_12_and_what_derives_from_it_pass(tmp_path):
+def test_debian_12_and_systems_from_it_pass(tmp_path):
     (tmp_path / "os-release").write_text('PRETTY_NAME="Raspberry Pi OS"\nVERSION_CODENAME=bookworm')
     done = check(tmp_path / "os-release")
     assert (done.returncode, done.stderr) == (0, "")
