@@ -26,7 +26,7 @@ BLOCKS = [
 PAGES = sorted({block.page for block in BLOCKS})
 ENDLESS = re.compile(r"rostopic (echo (?!.*-n)|pub -r|hz)|rosbag record|rosrun (topic_tools throttle|custom_ros_tools)")
 """Commands that run until Ctrl-C."""
-ENDLESS_S = 4.0
+ENDLESS_S = 10.0
 SHORTER = {
     r"--seeds [\d-]+( \d+)*": "--seeds 1",
     r"--count \d+": "--count 2",
@@ -104,23 +104,23 @@ class Terminal:
             self._launched = None
 
     def _printed(self, command: str) -> str:
-        """Runs a command, and returns what it prints."""
+        """Runs a command, and returns its standard output."""
         process = subprocess.Popen(
             ["bash", "-c", command],
             cwd=self._folder,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
         )
         try:
-            printed, _ = process.communicate(timeout=ENDLESS_S if ENDLESS.match(command) else SLOW_S)
+            printed, errors = process.communicate(timeout=ENDLESS_S if ENDLESS.match(command) else SLOW_S)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGINT)
-            printed, _ = process.communicate(timeout=SLOW_S)
-            assert ENDLESS.match(command) and "Traceback" not in printed, f"{command}\n{printed}"
+            printed, errors = process.communicate(timeout=SLOW_S)
+            assert ENDLESS.match(command) and "Traceback" not in errors, f"{command}\n{printed}{errors}"
         else:
-            assert process.returncode == 0, f"{command}\n{printed}"
+            assert process.returncode == 0, f"{command}\n{printed}{errors}"
         return printed
 
 
@@ -140,6 +140,7 @@ def home() -> Iterator[None]:
 
 
 @pytest.mark.thorough
+@pytest.mark.timeout(1800)
 @pytest.mark.usefixtures("home")
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_of_the_page_print_the_shown_output(ros: RosSystem, page: str) -> None:

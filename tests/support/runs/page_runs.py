@@ -105,7 +105,8 @@ def agree(shown: str, printed: str, varies: bool = False) -> bool:
         printed: The output of the run.
         varies: Whether numbers and columns may differ.
     """
-    texts = [_shape(each) if varies else each for each in (shown.strip(), printed.strip())]
+    lines = ("\n".join(map(str.rstrip, each.strip().splitlines())) for each in (shown, printed))
+    texts = [_shape(each) if varies else each for each in lines]
     pattern = ".*".join(re.escape(part) for part in texts[0].split("..."))
     return re.fullmatch(pattern, texts[1], re.DOTALL) is not None
 

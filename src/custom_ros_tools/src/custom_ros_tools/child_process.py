@@ -1,8 +1,9 @@
-"""Commands of child processes, start with an end together with the parent, and kill together with all children."""
+"""Commands, start, limits and end of child processes: they end with their parent, and together with all children."""
 
 import contextlib
 import fcntl
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -23,6 +24,21 @@ def python_module(name: str, *words: str) -> list[str]:
     """
     start = ["-P", "-m"] if sys.version_info >= (3, 11) else ["-c", _WITHOUT_FOLDER]
     return [sys.executable, *start, name, *words]
+
+
+def limit_resource(kind: int, soft: int, hard: int | None = None) -> None:
+    """Sets limits of this process. Limits that are lower already, such as those of `ulimit -t`, are kept.
+
+    Args:
+        kind: Constant of `resource`, such as `resource.RLIMIT_CPU`.
+        soft: Soft limit.
+        hard: Hard limit. None: the soft limit.
+    """
+    limits = (soft, soft if hard is None else hard)
+    present = resource.getrlimit(kind)
+    kept = (old if old != resource.RLIM_INFINITY and old < new else new for old, new in zip(present, limits))
+    lowest_soft, lowest_hard = kept
+    resource.setrlimit(kind, (min(lowest_soft, lowest_hard), lowest_hard))
 
 
 def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) -> subprocess.Popen[bytes]:
