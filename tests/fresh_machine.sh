@@ -16,6 +16,7 @@ Usage: tests/fresh_machine.sh [OPTIONS]     (as root; needs debootstrap, git, ip
 
   --root            on a machine where all is done as root
   --user            on a machine with an ordinary user who has sudo; by default both, one after the other
+  --deb FILE        only: on a machine without a checkout, installs this package of ./rpbi deb and starts an example
   --no-install      without the install space
   --tests [PATH]    also all extras and the tests, or those of PATH; may be given several times
   --folder FOLDER   where the machines are made, 3 GB (with tests 5 GB) each; by default in /var/tmp
@@ -167,11 +168,28 @@ use_machine() {
   fi
   if [[ $with_tests ]]; then
     offline=
-    timed "./rpbi setup ik mpc tags data gym html assets notebook farm" at_checkout "./rpbi setup ik mpc tags data gym html assets notebook farm"
+    timed "./rpbi setup ik mpc tags data gym html assets notebook farm site wheel" at_checkout "./rpbi setup ik mpc tags data gym html assets notebook farm site wheel"
     offline=yes
     timed "./rpbi test ${tests[*]}, without network" at_checkout "./rpbi test ${tests[*]}"
     report+=("$kind: $(used_mb) MB of disk with all extras")
   fi
+  [[ $keep ]] || remove "$machine"
+}
+
+# use_package FILE: installs it where no checkout is, and starts an example without a network.
+use_package() {
+  local offline=
+  kind=deb
+  machine=$folder/deb
+  cp --archive "$folder/base" "$machine"
+  cp "$1" "$machine/root/rpbi.deb"
+  timed "apt-get install rpbi.deb" in_machine root \
+    'apt-get update && apt-get install --yes --no-install-recommends ./rpbi.deb >install.log 2>&1 || ! tail install.log'
+  offline=yes
+  timed "the example, until its camera's first image" in_machine root 'source /opt/rpbi/install/setup.bash
+    roslaunch rpbi_examples basic_example_kuka_lwr.launch headless:=true & until rostopic list >/dev/null 2>&1; do sleep 1; done
+    timeout 60 rostopic echo -n 1 --noarr /rpbi/camera/colour/image && kill -INT $! && wait $!'
+  report+=("$kind: $(used_mb) MB of disk")
   [[ $keep ]] || remove "$machine"
 }
 
@@ -196,10 +214,11 @@ clean_up() {
   exit "$status"
 }
 
-kinds=() tests=() with_install=yes with_tests='' keep='' folder='' mirror='' child='' offline='' report=()
+kinds=() tests=() package='' with_install=yes with_tests='' keep='' folder='' mirror='' child='' offline='' report=()
 while (($#)); do
   case $1 in
     --root | --user) kinds+=("${1#--}") ;;
+    --deb) package=${2:?--deb: expected a package} && shift ;;
     --no-install) with_install= ;;
     --tests)
       with_tests=yes
@@ -230,4 +249,5 @@ trap clean_up EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM HUP
 make_base
+[[ ! $package ]] || { use_package "$package" && exit; }
 for kind in "${kinds[@]}"; do use_machine "$kind"; done

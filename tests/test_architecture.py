@@ -187,7 +187,7 @@ def test_only_the_world_calls_pybullet_in_the_simulator_node():
 FAMILIES = {
     "body": ("rpbi.bodies:BODY_TYPES", "rpbi.bodies.body:Body", "plugins.md"),
     "sensor": ("rpbi.sensors:SENSOR_TYPES", "rpbi.sensors.sensor:Sensor", "plugins.md"),
-    "solver": ("ik_ros.solvers:SOLVERS", "ik_ros.solver:Solver", "ik_solvers.md"),
+    "solver": ("ik_ros.solvers:SOLVERS", "ik_ros.solver:Solver", "ik.md"),
     "controller": (
         "rpbi.control.controllers:CONTROLLERS",
         "rpbi.control.controllers.controller:Controller",
@@ -215,7 +215,8 @@ def test_every_plug_in_is_explained(family):
     table, _, page = FAMILIES[family]
     text = (ROOT / "docs" / page).read_text()
     for name in pkgutil.resolve_name(table):
-        assert re.search(rf"\| \[?`{name}`(\]\(#{name}\))? \|", text), f"docs/{page} has no row for {family} '{name}'"
+        row = rf"\| \[?`{name}`(\]\((example_{name}\.md)?(#{name})?\))? \|"
+        assert re.search(row, text), f"docs/{page} has no row for {family} '{name}'"
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -42,8 +42,9 @@ def conflict_markers(folder: Path) -> list[str]:
 
 
 def test_no_file_has_conflict_markers() -> None:
-    folders = ("src", "docs", "tests", "dev", "docker")
+    folders = ("src", "docs", "tests", "dev", "docker", "requirements")
     assert [each for folder in folders for each in conflict_markers(ROOT / folder)] == []
+    assert b"<" * 7 not in b"".join(path.read_bytes() for path in ROOT.iterdir() if path.is_file())
 
 
 def test_conflict_markers_are_found(tmp_path: Path) -> None:

@@ -266,12 +266,12 @@ def wave(
     hand: Annotated[str, Argument("HAND", choices=lambda: ("left", "right"))] = "left",
     angle: Annotated[float, Argument("RAD", parse=number)] = 0.5,
 ) -> str:
-    """Waves at somebody.
+    """Waves at a person.
 
         ./rpbi wave Ada --hand right
 
     Args:
-        NAME: who is greeted
+        NAME: the greeted person
         hand: {choices}; left without it
         angle: how far [rad], or as 30deg
     """
@@ -290,7 +290,7 @@ FILES = {
     "format": {f"{FORMATS}/tally.py": FORMAT_FILE, "docs/datasets.md": "| `tally` | a number |"},
     "gym task": {f"{TASKS}/rest.py": GYM_TASK_FILE, "docs/gym.md": "| `rest` | waits |"},
     "scene": {f"{SCENES}/siesta.py": SCENE_FILE, "docs/examples.md": "| `siesta` | a robot rests |"},
-    "solver": {f"{SOLVERS}/lazy.py": SOLVER_FILE, "docs/ik_solvers.md": "| `lazy` | stays at the start |"},
+    "solver": {f"{SOLVERS}/lazy.py": SOLVER_FILE, "docs/ik.md": "| `lazy` | stays at the start |"},
     "command": {"src/rpbi_utils/src/rpbi_utils/console/wave.py": COMMAND_FILE},
 }
 """Files written by hand: a class each, and the example of the body, the topic of the sensor, the page of all others.
@@ -337,7 +337,7 @@ from ik_ros.solvers import SOLVERS
 from operator_node.devices import DEVICES
 from rpbi.gym.schemas import schemas as task_schemas
 from rpbi.world.schemas import file_schemas, schemas
-from rpbi.reference.config_page import config_page
+from rpbi.reference.config_page import config_pages
 from rpbi.ros.publishers.sample_topics import sample_topic
 from rpbi.ros.interface_page import interface_page
 from rpbi.reference.reference_world import reference_world
@@ -358,7 +358,7 @@ print(json.dumps({
     "message": topic.handler(samples[0], 1).data,
     "entries": schemas()["world"]["properties"]["marbles"]["items"],
     "schema": schemas()["marble"],
-    "config_page": config_page(file_schemas(), {}, {}),
+    "config_pages": config_pages(file_schemas(), {}, {}),
     "interface_page": interface_page(reference_world(), {}),
     "plugins_page": plugins_page(),
     "spawned": [kind_in({"name": "a", "radius": 1.0}), *kinds()],
@@ -437,8 +437,13 @@ def test_schemas_and_pages_have_the_new_types(found: dict[str, Any]) -> None:
     assert found["entries"]["anyOf"][1] == {"$ref": "marble.schema.json#/$defs/entry"}
     assert found["schema"]["properties"]["radius"]["unit"] == "m"
     assert found["schema"]["required"] == ["name", "radius"]
-    assert "| `marbles` | list of files, each [marble](#marble) |" in found["config_page"]
-    assert "| `radius` | number > 0 [m] | required | Radius of the marble. |" in found["config_page"]
+    assert (
+        "| `marbles` | list of files, each [marble](config_objects.md#marble) |"
+        in found["config_pages"]["config_world.md"]
+    )
+    assert (
+        "| `radius` | number > 0 [m] | required | Radius of the marble. |" in found["config_pages"]["config_objects.md"]
+    )
     assert "| `rpbi/NAME/height` | std_msgs/Float64 | Height of the base [m]. | marble |" in found["interface_page"]
     assert "| `marble` | A ball. |" in found["plugins_page"]
     assert "| `height` | Height of a body. |" in found["plugins_page"]
@@ -493,9 +498,9 @@ def test_command_has_help_and_a_section_and_runs(workspace: Path) -> None:
     section = """\
     ./rpbi wave NAME [--hand HAND] [--angle RAD]
 
-Waves at somebody.
+Waves at a person.
 
-    NAME             who is greeted
+    NAME             the greeted person
     --hand HAND      left or right; left without it
     --angle RAD      how far [rad], or as 30deg
 
@@ -503,7 +508,7 @@ Waves at somebody.
 """
     assert f"\n## wave\n\n{section}\n## " in (workspace / "docs/commands.md").read_text()
     assert run(workspace, "./rpbi", "wave", "--help").stdout == section
-    assert re.search(r"^  wave +Waves at somebody\.$", run(workspace, "./rpbi").stdout, re.MULTILINE)
+    assert re.search(r"^  wave +Waves at a person\.$", run(workspace, "./rpbi").stdout, re.MULTILINE)
     console = [sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"), "wave"]
     assert run(workspace, *console, "--help").stdout == section
     done = run(workspace, *console, "Ada", "--hand", "right", "--angle", "-30deg")

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from result import Result, Target
 
-from rpbi_mpc.pushing.controller import PushingConfig, PushingController
+from rpbi_mpc.pushing.config import ProgramConfig, PushingConfig
+from rpbi_mpc.pushing.controller import PushingController
 from rpbi_mpc.pushing.planar.paths import PathConfig
-from rpbi_mpc.pushing.program import ProgramConfig
 from rpbi_mpc.pushing.sampling_planner import PushSamplingConfig, SamplingPlanner
 from rpbi_mpc.pushing.simulated import PushingWorld
 from rpbi_mpc.pushing.trials import PushingTrial, Variation, run_trial

@@ -72,7 +72,7 @@ def table(results: Sequence[Result]) -> str:
     rows = [("benchmark", "figure", "value", "unit", "floor", "ratio", "target", "reached")]
     for one in results:
         reached = {None: "", True: "yes", False: "NO"}[one.reached]
-        numbers = [_number(number) for number in (one.value, one.floor, one.ratio)]
+        numbers = [number(each) for each in (one.value, one.floor, one.ratio)]
         target = str(one.target or "")
         rows.append((one.benchmark, one.figure, numbers[0], one.unit, *numbers[1:], target, reached))
     widths = [max(map(len, column)) for column in zip(*rows)]
@@ -87,7 +87,8 @@ def table(results: Sequence[Result]) -> str:
     return "\n".join([lines[0], "-" * max(map(len, lines)), *lines[1:]])
 
 
-def _number(value: float | None) -> str:
+def number(value: float | None) -> str:
+    """Returns a number with four digits, or an empty text for None."""
     if value is None:
         return ""
     return f"{value:.0f}" if abs(value) >= 10_000 else f"{value:.4g}"

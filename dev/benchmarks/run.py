@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import importlib
 import json
 import os
@@ -16,6 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import results_page
 from result import Result, table
 
 BENCHMARKS = (
@@ -49,13 +51,14 @@ print("renderer:", open_renderer([Camera("camera", "camera", Intrinsics())]).nam
 """
 
 
-def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None) -> int:
+def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None, page: bool = False) -> int:
     """Runs benchmarks.
 
     Args:
         names: Their names, of BENCHMARKS or WHEN_NAMED; without any, those of BENCHMARKS.
         quick: Whether to measure for a shorter time, less exactly.
         json_file: File for the figures.
+        page: Whether to keep the figures and write docs/results.md.
 
     Returns:
         The exit code: 1 if one could not run.
@@ -68,7 +71,10 @@ def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None
         print(f"==> {name}", file=sys.stderr, flush=True)
         start_s = time.monotonic()
         try:
-            results += importlib.import_module(name).run(quick)
+            measured = importlib.import_module(name).run(quick)
+            results += measured
+            if page:
+                results_page.keep(name, measured, facts, quick)
         except Exception:
             traceback.print_exc()
             failed.append(name)
@@ -77,14 +83,20 @@ def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None
     if json_file:
         report = {"machine": facts, "quick": quick, "results": [one.as_dict() for one in results]}
         json_file.write_text(json.dumps(report, indent=2) + "\n")
+    if page:
+        results_page.write()
     if failed:
         print(f"could not run: {', '.join(failed)}", file=sys.stderr)
     return 1 if failed else 0
 
 
 def machine() -> dict[str, Any]:
-    """Returns the properties of the machine that figures depend on."""
+    """Returns the properties of the machine and of the workspace that figures depend on."""
+    describe = ("git", "describe", "--always", "--dirty", "--abbrev=10")
+    commit = subprocess.run(describe, cwd=Path(__file__).parent, capture_output=True, text=True).stdout.strip()
     return {
+        "date": datetime.date.today().isoformat(),
+        "commit": commit or "unknown",
         "cores": os.cpu_count(),
         "processor": _processor(),
         "load_average": round(os.getloadavg()[0], 2),

@@ -26,6 +26,7 @@ _rpbi_starting_with() {
 _rpbi_examples() { (cd "$1/src/rpbi_examples/launch" && printf '%s\n' *.launch | sed 's/\.launch$//'); }
 _rpbi_extras() { (cd "$1/requirements/extras" && printf '%s\n' *.txt | sed 's/\.txt$//'); }
 _rpbi_benchmarks() { sed -n "/^BENCHMARKS/,/^)/p; /^WHEN_NAMED/p" "$1/dev/benchmarks/run.py" | grep -oE '"[a-z_]+"' | tr -d '"'; }
+_rpbi_pictures() { sed -n "/^PICTURES/,/^}/p" "$1/dev/pictures/draw.py" | grep -oE '^ +"[a-z_]+' | tr -d ' "'; }
 
 # Prints the arguments, as NAME:=, of a launch file, an example's or one that runs a world.
 _rpbi_launch_arguments() {

@@ -141,7 +141,7 @@ def test_space_pauses_and_c_clears(window: _Window) -> None:
     held = window.data()[FIELD]
     time.sleep(0.3)  # in which the line would grow
     assert window.data()[FIELD].equals(held)
-    window.press("space", "goes on")
+    window.press("space", "continues")
     wait_until(lambda: window.data()[FIELD].index[-1] > held.index[-1] + 0.2, "the line goes on", every_s=0.1)
     before_s = window.data()[FIELD].index[-1]
     button = window.widgets["clear"]

@@ -39,7 +39,7 @@ def test_the_blocks_run_one_after_the_other(tmp_path):
     program = [str(ROOT / ".venv/bin/python"), "-c", "\n".join(blocks)]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
-    (shown,) = re.findall(r"```\n(3.0 s to .*?)\n```", PAGE)
+    (shown,) = re.findall(r"```text\n(3.0 s to .*?)\n```", PAGE)
     lines = done.stdout.splitlines()
     assert lines[:3] == [shown, "201 samples in 10.00 s", "half-way at [0.25 0.1  0.45]"]
     assert lines[3].startswith("spread of the demonstrations at the end: [0.0")

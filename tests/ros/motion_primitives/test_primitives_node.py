@@ -55,7 +55,7 @@ def string(ros, name, data):
 @pytest.fixture
 def of_page(capsys, monkeypatch):
     """Returns what the next command of docs/learning.md for a service prints, in the order of the page."""
-    (block,) = re.findall(r"```\n(\$ rosservice .*?)```", PAGE, re.DOTALL)
+    (block,) = re.findall(r"```console\n(\$ rosservice .*?)```", PAGE, re.DOTALL)
     commands = iter([line.removeprefix("$ ") for line in block.splitlines() if line.startswith("$ ")])
 
     def run(service: str) -> str:

@@ -65,7 +65,7 @@ def test_frame_moves_only_while_a_signal_is_received(ros):
     assert frame.positions[0] == (0.0, 0.0, 0.0)
     with publishing("operator_node/signal", Float64MultiArray) as signal:
         held(signal, [0.5, 0.0, 0.0, 0.0, 0.0, 1.0], lambda: frame.positions[-1][0] > 0.1, "it moves")
-        rosout.wait_for(["/operator_node/signal: no message for 0.2 s: the frame stands still"])
+        rosout.wait_for(["/operator_node/signal: no message for 0.2 s: the frame does not move"])
         wait_until(lambda: len(frame.positions) > 20 and len(set(frame.positions[-20:])) == 1, "it stands still")
         x = frame.positions[-1][0]
         assert 0.1 < x and frame.transforms[-1].rotation.z > 0.0
@@ -102,7 +102,7 @@ def test_it_is_switched_and_reset_and_stays_within_its_box(ros):
         held(signal, [2.0, 0.0, 0.0], lambda: frame.positions[-1][0] == 0.2, "it goes to the wall of its box")
         held(signal, [1.0, 0.0, -9.0], lambda: rosout.logs("the signal is reduced to max_speed 2 m/s"), "it is slowed")
         for data in ([1.0], [math.nan, 0.0, 0.0]):
-            held(signal, data, lambda: rosout.logs("message refused, and the frame stands still"), "it is refused")
+            held(signal, data, lambda: rosout.logs("message refused, and the frame does not move"), "it is refused")
         assert ros.call("toggle_teleop_tf", SetBool, False).message == "teleoperation is off"
     assert max(x for x, _, _ in frame.positions) == 0.2
 

@@ -19,7 +19,7 @@ FILES = {name: text for text, name in re.findall(r"```(?:yaml|python)\n(# (\S+).
 """The files on the page, by the names in their first lines."""
 COMMANDS = [
     line.replace("~/rpbi", str(ROOT))
-    for block in re.findall(r"```\n(~/rpbi.*?)```", PAGE, flags=re.DOTALL)
+    for block in re.findall(r"```shell\n(~/rpbi.*?)```", PAGE, flags=re.DOTALL)
     for line in block.splitlines()
 ]
 LAUNCH = " launch "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 
 import numpy as np
 import pytest
@@ -24,9 +25,9 @@ REPORT = ("cycles.csv", "path.png", "errors.png", "cycles.png")
 LINE = ("headless:=true", "path:=line")
 
 
-def summary_of(process, folder) -> dict:
+def summary_of(ros: RosSystem, process, folder) -> dict:
     wait_until(lambda: process.poll() is not None, "it ends by itself", SLOW_S)
-    assert process.returncode == 0
+    assert process.returncode == 0 and "REQUIRED process" not in ros.output(process)
     return json.loads((folder / "summary.json").read_text())
 
 
@@ -77,7 +78,7 @@ def test_hand_pushes_by_single_steps_and_to_the_paths_end(ros: RosSystem, tmp_pa
     assert ros.call("mpc/start", Trigger).success
     refused = ros.call("mpc/step", Trigger)
     assert not refused.success and refused.message == "the loop is running; call mpc/stop first"
-    summary = summary_of(process, tmp_path)
+    summary = summary_of(ros, process, tmp_path)
     assert summary["finished"] and summary["mean_error_mm"] < 5.0, summary
     assert summary["by_status"]["solved"] > 100
     assert all((tmp_path / name).stat().st_size > 10_000 for name in REPORT)
@@ -89,7 +90,7 @@ def test_guarded_real_robot_pushes_with_the_same_launch_file(ros: RosSystem, tmp
     driver = ros.listen("/stand_in/driver_state", DriverState)
     arguments = (*LINE, "real_robot:=true", f"out:={tmp_path}")
     process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments])
-    summary, output = summary_of(process, tmp_path), ros.output(process)
+    summary, output = summary_of(ros, process, tmp_path), ros.output(process)
     assert driver.messages[-1].reflexes == 0, driver.messages[-1].message
     is_accurate = summary["finished"] and summary["mean_error_mm"] < 15.0
     if not is_accurate and "too slow: a cycle takes" in output:
@@ -122,3 +123,14 @@ def test_wrong_arguments_are_errors_with_their_key(ros: RosSystem, arguments: st
     process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", "headless:=true", *arguments.split()])
     wait_until(lambda: process.poll() is not None, "it ends by itself", SLOW_S)
     assert WRONG[arguments] in ros.output(process)
+
+
+def test_missing_extra_ends_all_nodes_with_one_line(ros: RosSystem, tmp_path) -> None:
+    (tmp_path / "casadi.py").write_text("raise ImportError('none here', name='casadi')\n")
+    modules = os.pathsep.join((str(tmp_path), os.environ["PYTHONPATH"]))
+    process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *LINE], PYTHONPATH=modules)
+    wait_until(lambda: process.poll() is not None, "it ends by itself", SLOW_S)
+    output = ros.output(process)
+    (line,) = (line for line in output.splitlines() if "not installed" in line)
+    assert "'casadi' is not installed: ./rpbi setup mpc" in line and "FATAL" in line, output
+    assert "Traceback" not in output and output.count("FATAL") == 1, output

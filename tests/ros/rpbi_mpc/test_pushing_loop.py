@@ -16,10 +16,11 @@ from custom_ros_tools.errors import InterfaceError
 from robot_model.asset_files import find_file
 from rpbi_mpc.msg import MpcStatus
 from rpbi_mpc.node_configs import PushingNodeConfig
+from rpbi_mpc.pushing.config import ProgramConfig
 from rpbi_mpc.pushing.controller import PushingController
 from rpbi_mpc.pushing.hand import PlanarHand
 from rpbi_mpc.pushing.planner import ProgramPlanner
-from rpbi_mpc.pushing.program import ProgramConfig, PushingProgram
+from rpbi_mpc.pushing.program import PushingProgram
 from rpbi_mpc.records import table_of
 from rpbi_mpc.ros.listener import SceneListener
 from rpbi_mpc.ros.loop_node import LoopNode

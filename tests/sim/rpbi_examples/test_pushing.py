@@ -15,7 +15,7 @@ from rpbi.world.loading import load_world
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.pushing import NEAR_M, PLACES, Pusher, ball_solver, next_push
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "dev/tools/clean_forces"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "dev/pictures"))
 
 from pushes import COMPLIANT, PLANE, pushed  # noqa: E402
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rpbi_mpc import LockStep
-from rpbi_mpc.pushing.controller import PushingConfig, PushingController
+from rpbi_mpc.pushing.config import ProgramConfig, PushingConfig
+from rpbi_mpc.pushing.controller import PushingController
 from rpbi_mpc.pushing.outcome import ToleranceConfig
 from rpbi_mpc.pushing.planar.paths import PathConfig, PushPath
 from rpbi_mpc.pushing.planner import ProgramPlanner
-from rpbi_mpc.pushing.program import ProgramConfig
 from rpbi_mpc.pushing.sampling_planner import PushSamplingConfig, SamplingPlanner
 from rpbi_mpc.pushing.simulated import PushingWorld
 from rpbi_mpc.pushing.trials import HEIGHT, Variation, pushing_world, run_trial, shove

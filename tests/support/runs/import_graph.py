@@ -11,6 +11,10 @@ from pathlib import Path
 
 GENERATED = re.compile(r"^\w+\.(msg|srv|action)\b")
 """Messages and services, which are not in the source tree."""
+OF_ROS = re.compile(
+    r"(rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|ros_pybullet_interface|\w+_msgs|\w+_srvs|\w+\.(msg|srv))\b"
+)
+"""Imports that need ROS."""
 TABLE_ENTRY = re.compile(r'"((?!\w+\.ros\.)[a-z_][\w.]*):[A-Za-z_]\w*"')
 """A class that a table of plug-ins imports when it is asked for."""
 
@@ -148,3 +152,14 @@ def imported_names(path: Path, module: str, *, typing: bool = True) -> Iterator[
 
 def _is_for_typing(node: ast.stmt) -> bool:
     return isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+
+
+def needing_ros(graph: ImportGraph) -> dict[str, str]:
+    """Returns the modules that need ROS, also by way of others, and of each the import that leads to it."""
+    direct = {
+        name: target
+        for name, path in graph.files.items()
+        for target in imported_names(path, name, typing=False)
+        if OF_ROS.match(target)
+    }
+    return graph.leading_to(direct)

@@ -66,6 +66,10 @@ EXTRA_OF = {
     "pyarrow": "data",
     "rosbags": "data",
     "ray": "farm",
+    "mkdocs": "site",
+    "py_mini_racer": "site",
+    "hatchling": "wheel",
+    "vermin": "wheel",
 }
 """Extra that has a module."""
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 
+import pytest
 from ros_system import is_running, wait_until
 
 PARENT = """
@@ -36,3 +37,19 @@ def test_child_outlives_its_starting_thread_but_not_a_killed_parent():
     wait_until(lambda: not is_running(int(child)), "the child has ended")
     assert is_running(int(control)), "a child that is started otherwise outlives its parent"
     os.kill(int(control), signal.SIGKILL)
+
+
+@pytest.mark.parametrize(
+    ("present", "wanted", "expected"),
+    [("100, 200", "50, 60", "50 60"), ("100, 200", "150, 400", "100 200"), ("70, 70", "50, 90", "50 70")],
+)
+def test_lower_limits_of_the_processor_time_are_kept(present, wanted, expected):
+    program = f"""
+import resource
+from custom_ros_tools.child_process import limit_resource
+resource.setrlimit(resource.RLIMIT_CPU, ({present}))
+limit_resource(resource.RLIMIT_CPU, {wanted})
+print(*resource.getrlimit(resource.RLIMIT_CPU))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60.0)
+    assert done.stdout.split() == expected.split(), done.stderr

@@ -11,7 +11,7 @@ from operator_node.devices import DEVICES
 from operator_node.devices.device_feed import FeedConfig
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-PAGES = {"mvn": "mvn.md"}
+PAGES = {"mvn": "motion_capture.md"}
 """Of devices that have a page of their own."""
 MODELS = {"feed": FeedConfig, **{name: DEVICES.find(name).Config for name in DEVICES}}
 

@@ -85,7 +85,7 @@ def test_the_capture_point_comes_to_its_goal():
 
 
 def test_pushes_are_drawn_from_the_table_of_the_docs(tmp_path):
-    text = (Path(__file__).resolve().parents[3] / "docs/examples.md").read_text()
+    text = (Path(__file__).resolve().parents[3] / "docs/example_talos.md").read_text()
     pushes = pushes_in(text)
     assert pushes.keys() == set(DIRECTIONS) and min(pushes.values()) >= 10.0, "as large as in the scene"
     draw(pushes, tmp_path / "pushes.png")

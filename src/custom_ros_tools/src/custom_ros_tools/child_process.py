@@ -1,13 +1,44 @@
-"""Starts child processes that end with their parent, and kills processes together with their children."""
+"""Commands, start, limits and end of child processes: they end with their parent, and together with all children."""
 
 import contextlib
 import fcntl
 import os
+import resource
 import signal
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+_WITHOUT_FOLDER = "import runpy, sys; del sys.path[0]; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
+"""Runs the module that the first argument names."""
+
+
+def python_module(name: str, *words: str) -> list[str]:
+    """Returns the command that runs a module by this Python; files of the current folder hide no module.
+
+    Args:
+        name: Full name of the module.
+        words: Arguments of the module.
+    """
+    start = ["-P", "-m"] if sys.version_info >= (3, 11) else ["-c", _WITHOUT_FOLDER]
+    return [sys.executable, *start, name, *words]
+
+
+def limit_resource(kind: int, soft: int, hard: int | None = None) -> None:
+    """Sets limits of this process. Limits that are lower already, such as those of `ulimit -t`, are kept.
+
+    Args:
+        kind: Constant of `resource`, such as `resource.RLIMIT_CPU`.
+        soft: Soft limit.
+        hard: Hard limit. None: the soft limit.
+    """
+    limits = (soft, soft if hard is None else hard)
+    present = resource.getrlimit(kind)
+    kept = (old if old != resource.RLIM_INFINITY and old < new else new for old, new in zip(present, limits))
+    lowest_soft, lowest_hard = kept
+    resource.setrlimit(kind, (min(lowest_soft, lowest_hard), lowest_hard))
 
 
 def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) -> subprocess.Popen[bytes]:

@@ -16,8 +16,11 @@ import yaml
 
 from .errors import ConfigError, Problem, closest, shortened
 
-_SOURCES = Path(__file__).resolve().parents[3]
-"""Folder of this workspace's packages, if the code runs from its sources."""
+_HERE = Path(__file__).resolve()
+SOURCES = _HERE.parents[3] if (_HERE.parents[2] / "package.xml").is_file() else None
+"""Folder of this workspace's packages, if the code runs from its sources; None in an install space or a wheel."""
+_SHARE = _HERE.with_name("share")
+"""Folder of this workspace's packages in a wheel, without their code."""
 MAX_BYTES = 16_000_000
 """Largest length of a YAML file or text; longer files are rejected."""
 MAX_VALUES = 1_000_000
@@ -34,29 +37,32 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 def ros_package_path(package: str) -> str:
     """Returns the folder of a ROS package.
 
-    Searches the folders in ROS_PACKAGE_PATH, and then the source folder of this workspace.
-
     Raises:
         ConfigError: If the package is not found.
     """
-    search_path = os.environ.get("ROS_PACKAGE_PATH", "")
-    packages = _packages(search_path)
+    packages = ros_packages()
     try:
         return str(packages.get_path(package))
     except rospkg.ResourceNotFound:
         match = closest(package, packages.list())
-    advice = f"; did you mean '{match}'?" if match else f" (ROS_PACKAGE_PATH is {search_path or 'nothing'})"
+    search_path = os.environ.get("ROS_PACKAGE_PATH") or "nothing"
+    advice = f"; did you mean '{match}'?" if match else f" (ROS_PACKAGE_PATH is {search_path})"
     raise ConfigError([Problem("", "", f"unknown ROS package '{package}'{advice}")])
+
+
+def ros_packages() -> rospkg.RosPack:
+    """Returns the index of the ROS packages in ROS_PACKAGE_PATH, then in the sources or the wheel of this workspace."""
+    return _packages(os.environ.get("ROS_PACKAGE_PATH", ""))
 
 
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
-    """Returns the index of the ROS packages for a value of ROS_PACKAGE_PATH.
+    """Returns the index for a value of ROS_PACKAGE_PATH.
 
     The result is cached, since making the index reads all folders.
     """
-    is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # false if this package is installed
-    return rospkg.RosPack([*rospkg.get_ros_paths(), *([str(_SOURCES)] if is_source else [])])
+    own = [str(folder) for folder in (SOURCES, _SHARE) if folder is not None and folder.is_dir()]
+    return rospkg.RosPack([*rospkg.get_ros_paths(), *own])
 
 
 def replace_package(path: str) -> str:

@@ -5,10 +5,15 @@ from which they compose the message.
 """
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
+IS_WHEEL = Path(__file__).with_name("share").is_dir()
+"""Whether this code runs from the wheel, where there is no `./rpbi`."""
+_SETUP = re.compile(r"\./rpbi setup(?: (\w+))?")
 MAX_QUOTE_LENGTH = 60
 """Largest number of characters that a message quotes from a file, which may be confidential."""
 MAX_LINE_LENGTH = 2_000
@@ -114,7 +119,9 @@ class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is th
     how: str
 
     def __str__(self) -> str:
-        return f"'{self.package}' is not installed: {self.how}"
+        match = _SETUP.fullmatch(self.how) if IS_WHEEL else None
+        wanted = f"'rpbi[{match[1]}]'" if match and match[1] else self.package
+        return f"'{self.package}' is not installed: {f'pip install {wanted}' if match else self.how}"
 
 
 @dataclass(eq=False)

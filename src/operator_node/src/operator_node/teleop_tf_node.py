@@ -85,7 +85,7 @@ class TeleopTf:
             try:
                 is_slowed = self._teleop.command(message.data, self._now())
             except ValueError as error:
-                self._warn(self._input.topic, f"message refused, and the frame stands still: {error}")
+                self._warn(self._input.topic, f"message refused, and the frame does not move: {error}")
                 return
         if is_slowed:
             limits = f"max_speed {self._config.max_speed:g} m/s, max_turn_rate {self._config.max_turn_rate:g} rad/s"
@@ -97,7 +97,7 @@ class TeleopTf:
                 if self._config.broadcast_always:
                     self._broadcast_once_a_stamp()
                 return
-            if self._teleop.moves and self._input.has_ceased("the frame stands still"):
+            if self._teleop.moves and self._input.has_ceased("the frame does not move"):
                 self._teleop.stop()
             self._teleop.step(self._now())
             self._broadcast_once_a_stamp()

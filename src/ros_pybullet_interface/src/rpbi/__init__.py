@@ -4,6 +4,10 @@ import os
 import sys
 from importlib import import_module
 
+if not ((3, 10) <= sys.version_info < (3, 12) and sys.platform == "linux"):
+    _this = f"Python {sys.version_info[0]}.{sys.version_info[1]} on {sys.platform}"
+    raise ImportError(f"rpbi needs CPython 3.10 or 3.11 on Linux, and this is {_this}")
+
 _GREETING = b"pybullet build time: "
 
 

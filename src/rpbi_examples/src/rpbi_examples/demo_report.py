@@ -15,6 +15,8 @@ import pandas as pd  # noqa: E402
 
 ENOUGH = 0.95
 """Share of the expected rate that a topic's measured rate must reach."""
+RED, GREEN, BLUE = "#d62728", "#2ca02c", "#1f77b4"
+"""Colours of the axes x, y and z, as RViz has them."""
 MIN_SPAN_RAD = 0.2
 """Smallest height of a joint's plot [rad or m], so that the noise of a joint at rest is not magnified."""
 
@@ -62,29 +64,30 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
     """Writes a picture of positions and targets over time, for all joints that have targets."""
     columns = [column for column in targets.columns if column.startswith("position/")]
     start_s = states.index[0]
-    figure, axes = plt.subplots(len(columns), sharex=True, figsize=(9, 1.3 * len(columns) + 1), squeeze=False)
+    size = (9, 1.3 * len(columns) + 1)
+    figure, axes = plt.subplots(len(columns), sharex=True, figsize=size, squeeze=False, layout="constrained")
     for axis, column in zip(axes[:, 0], columns, strict=True):
         axis.plot(targets.index - start_s, targets[column], color="#e8731a", lw=2.2, label="target")
         axis.plot(states.index - start_s, states[column], color="#22333f", lw=1.0, label="position")
-        axis.set_ylabel(column.removeprefix("position/").removesuffix("_joint") + "\n[rad]", fontsize=8)
+        axis.set_ylabel(column.removeprefix("position/").removesuffix("_joint") + "\n[rad]", fontsize=9)
         low, high = axis.get_ylim()
         half = max((high - low) / 2.0, MIN_SPAN_RAD / 2.0)
         axis.set_ylim((low + high) / 2.0 - half, (low + high) / 2.0 + half)
         axis.grid(alpha=0.3)
-    axes[0, 0].legend(loc="upper right", ncols=2, fontsize=8)
     axes[-1, 0].set_xlabel("simulated time [s]")
+    axes[-1, 0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.5), ncols=2, frameon=False)
     _save(figure, path, "Joint positions and their targets")
 
 
 def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
     """Writes a picture of the motor efforts of the given joints over time."""
-    figure, axis = plt.subplots(figsize=(9, 4))
+    figure, axis = plt.subplots(figsize=(9, 4), layout="constrained")
     for joint in joints:
         axis.plot(states.index - states.index[0], states[f"effort/{joint}"], lw=1.0, label=joint)
     axis.set_xlabel("simulated time [s]")
     axis.set_ylabel("effort [N m]")
     axis.grid(alpha=0.3)
-    axis.legend(fontsize=8, ncols=2, loc="upper right")
+    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     _save(figure, path, "Motor efforts")
 
 
@@ -121,20 +124,28 @@ def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start
         start_s: Time at the origin of the plot [s].
         path: Picture file to write.
     """
-    figure, (above, below) = plt.subplots(2, sharex=True, figsize=(9, 5))
-    above.plot(friction.index - start_s, friction, color="#22333f", lw=2.2, alpha=0.35, label="mu N of the floor")
-    above.plot(push.index - start_s, push, color="#e8731a", lw=1.2, label="arm on box")
-    above.set_ylabel("force [N]")
-    above.margins(y=0.3)  # for the legend
-    above.legend(fontsize=8, ncols=2, loc="upper right")
-    for axis, colour in zip("xyz", ("#c0392b", "#27864a", "#2c5f8a")):
-        below.plot(wrist.index - start_s, wrist[f"wrench/force/{axis}"], color=colour, lw=1.0, label=axis)
+    figure, (above, below) = plt.subplots(2, sharex=True, figsize=(10, 5.4), layout="constrained")
+    above.plot(friction.index - start_s, friction, color="#22333f", lw=3.0, alpha=0.35, label="friction limit mu N")
+    above.plot(push.index - start_s, push, color="#e8731a", lw=1.4, label="arm on the box")
+    above.set_ylabel("force on the box [N]")
+    for axis, colour in zip("xyz", (RED, GREEN, BLUE)):
+        below.plot(wrist.index - start_s, wrist[f"wrench/force/{axis}"], color=colour, lw=1.4, label=axis)
     below.set_ylabel("force in the wrist [N]")
     below.set_xlabel("simulated time [s]")
-    below.legend(fontsize=8, ncols=3, loc="upper right")
     for part in (above, below):
         part.grid(alpha=0.3)
-    _save(figure, path, "Contact: force of the arm on the box, and the force-torque sensor in the wrist")
+        for begin_s, end_s in _contact_times(push):
+            part.axvspan(begin_s - start_s, end_s - start_s, color="#e8731a", alpha=0.12, lw=0, label="arm pushes")
+        handles = dict(zip(*reversed(part.get_legend_handles_labels())))  # one entry for all pushes
+        part.legend(handles.values(), handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    _save(figure, path, "Push of the arm on the box, and force-torque sensor in the wrist")
+
+
+def _contact_times(push: pd.Series) -> list[tuple[float, float]]:
+    """Returns the first and the last time of each contact without a gap [s]."""
+    touches = push > 0.0
+    contacts = touches.index.to_series().groupby((touches != touches.shift()).cumsum()[touches])
+    return [(float(times_s.iloc[0]), float(times_s.iloc[-1])) for _, times_s in contacts]
 
 
 def save_colour(pixels: npt.NDArray[np.uint8], path: Path) -> None:
@@ -150,7 +161,7 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
         far_m: Depth of the far plane [m]; pixels at this depth are white.
         path: Picture file to write.
     """
-    figure, axis = plt.subplots(figsize=(7.2, 4.9))
+    figure, axis = plt.subplots(figsize=(7.2, 4.9), layout="constrained")
     image = axis.imshow(np.where(depth_m < 0.999 * far_m, depth_m, np.nan), cmap="viridis_r")
     figure.colorbar(image, ax=axis, label="depth along the optical axis [m]")
     axis.set_xlabel("column [px]")
@@ -213,7 +224,6 @@ def as_text(summary: Mapping[str, Any]) -> str:
 
 
 def _save(figure: Any, path: Path, title: str) -> None:
-    figure.suptitle(title, fontsize=11)
-    figure.tight_layout()
+    figure.suptitle(title, fontsize=12)
     figure.savefig(path, dpi=110)
     plt.close(figure)

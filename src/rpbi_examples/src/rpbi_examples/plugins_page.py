@@ -23,7 +23,7 @@ TABLES: tuple[tuple[str, PluginTable, str], ...] = (
     ("Objects", BODY_TYPES, "[worlds](worlds.md)"),
     ("Sensors", SENSOR_TYPES, "[worlds](worlds.md)"),
     ("Controllers", CONTROLLERS, "[controllers](controllers.md)"),
-    ("Solvers", SOLVERS, "[solvers](ik_solvers.md)"),
+    ("Solvers", SOLVERS, "[solvers](ik.md#solvers)"),
     ("Tasks", TASKS, "[tasks](ik_tasks.md)"),
     ("Tasks of environments", GYM_TASKS, "[environments](gym.md)"),
     ("Scenes", SCENES, "[examples](examples.md)"),

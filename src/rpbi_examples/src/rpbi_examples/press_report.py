@@ -165,24 +165,25 @@ class Press:
         figure.clear()  # type: ignore[attr-defined]
         upper, lower = figure.subplots(2, 1, sharex=True)  # type: ignore[attr-defined]
         times_s = [each.time_s for each in self.samples]
-        upper.plot(times_s, [each.felt_n for each in self.samples], color="tab:red", label="felt at the handle")
-        upper.plot(
-            times_s, [each.measured_n for each in self.samples], "--", color="tab:gray", label="measured at the wrist"
-        )
-        upper.set_ylabel("force along z [N]")
-        lower.plot(times_s, [1e3 * each.target_z for each in self.samples], "--", color="tab:gray", label="target")
+        forces = {"on the tool,\nmeasured in the wrist": "measured_n", "on the handle,\nfelt by the hand": "felt_n"}
+        for (label, name), colour in zip(forces.items(), ("tab:orange", "tab:purple")):
+            upper.plot(times_s, [getattr(each, name) for each in self.samples], color=colour, label=label)
+        upper.set_ylabel("force upwards [N]")
         lower.plot(times_s, [1e3 * each.tool_z for each in self.samples], color="tab:blue", label="tool")
-        lower.axhline(1e3 * self._touch_height, color="tab:green", linewidth=1, label="box")
+        lower.plot(times_s, [1e3 * each.target_z for each in self.samples], "--", color="0.35", label="its target")
+        low_mm, touch_mm = lower.get_ylim()[0], 1e3 * self._touch_height
+        lower.axhspan(low_mm, touch_mm, color="tab:brown", alpha=0.15, lw=0, label="tool in the box")
+        lower.set_ylim(bottom=low_mm)
         lower.set_ylabel("height [mm]")
         lower.set_xlabel("time [s]")
         for axes in (upper, lower):
             axes.grid(alpha=0.3)
-            axes.legend(loc="upper right")
+            axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
 
     def write_figure(self, path: Path) -> None:
         """Draws the press, and writes the figure to a PNG file."""
         from matplotlib.figure import Figure  # importing it takes half a second; other callers need not wait for it
 
-        figure = Figure(figsize=(7.0, 5.0), dpi=120, layout="tight")
+        figure = Figure(figsize=(9.0, 5.0), dpi=120, layout="constrained")
         self.draw(figure)
         figure.savefig(path)

@@ -65,7 +65,7 @@ class Guard:
     to last one period, independently of stamps, so that stamps cannot make the robot faster. The caller ensures that
     commands are at least a period apart.
 
-    Of several targets with the same stamp, only the first causes a command. The check `staleness` ignores the others,
+    If several targets have the same stamp, only the first causes a command. The check `staleness` ignores the others,
     as if they had not arrived.
 
     With the option `shape`, a target that the joints cannot follow is smoothed, and the smoothed command is checked.

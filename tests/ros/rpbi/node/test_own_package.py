@@ -44,7 +44,7 @@ def workspace(tmp_path_factory):
     """The template, copied, renamed and built by the first commands of docs/extending.md."""
     folder = tmp_path_factory.mktemp("lab") / "workspace"
     text = (ROOT / "docs" / "extending.md").read_text()
-    commands, start = text.split("```")[1].strip().rsplit("\n", 1)
+    commands, start = text.split("```")[1].removeprefix("shell").strip().rsplit("\n", 1)
     assert start == f"roslaunch {NAME} lab.launch"
     lines = "set -e\n" + commands.replace("~/rpbi", str(ROOT)).replace("~/lab_ws", str(folder))
     environment = {"PATH": "/usr/local/bin:/usr/bin:/bin", "HOME": os.environ["HOME"]}

@@ -20,7 +20,7 @@ from ros_pybullet_interface.srv import GetStateHash, Predict, StepN
 
 JOINT = "lbr_iiwa_joint_1"
 INPUT = "iiwa/target"
-PAGE = Path(__file__).resolve().parents[4] / "docs/many_worlds.md"
+PAGE = Path(__file__).resolve().parents[4] / "docs/replay_and_fork.md"
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,7 @@ def _ends(ros, *arguments):
     """Launches a scene and returns seed, verdict, time, figures and state hash of each episode, once all have ended."""
     process = ros.start(["roslaunch", "rpbi_examples", *arguments, *OPTIONS])
     wait_until(lambda: process.poll() is not None, "all episodes have ended", 240.0)
+    assert "REQUIRED process" not in ros.output(process)
     return ENDED.findall(ros.output(process))
 
 

@@ -191,7 +191,7 @@ def test_anchors_are_read_with_and_without_the_bodys_own_id(written, understood)
         ([0, "nobody"], "[0]: expected the name of a rigid body that is there already, got 'nobody': ground"),
         ([0, "jelly"], "[0]: expected the name of a rigid body that is there already, got 'jelly': ground"),
         ([0, "ground", "lid"], "unknown link of ground 'lid'"),
-        ([0, "ground", 1], "createSoftBodyAnchor[0]: 'ground' has 0 links beside the base, got 1"),
+        ([0, "ground", 1], "createSoftBodyAnchor[0]: 'ground' has 0 links in addition to the base, got 1"),
         ([0, 2], "expected the name of a body, or -1 for the world; got 2"),
         ([-1], "createSoftBodyAnchor[0]: must be >= 0, got -1"),
         ("0", "createSoftBodyAnchor[0]: expected a list"),

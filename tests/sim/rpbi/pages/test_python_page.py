@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 import yaml
+from page_blocks import blocks_of
+from page_runs import run_blocks
 
 ROOT = Path(__file__).resolve().parents[4]
 PYTHON = ROOT / ".venv/bin/python"
 VARIATION = ROOT / "src/rpbi_examples/configs/gym/push/random.yaml"
-BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
 def run(script: str, folder: Path, python: Path = PYTHON) -> subprocess.CompletedProcess:
@@ -24,14 +25,10 @@ def run(script: str, folder: Path, python: Path = PYTHON) -> subprocess.Complete
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory) -> list[str]:
-    """What the blocks of the page print, one after the other in one process, a part for each block."""
-    blocks = BLOCK.findall((ROOT / "docs/python.md").read_text())
-    script = "\nprint('-----')\n".join(blocks)
-    result = run(script, tmp_path_factory.mktemp("page"))
-    assert result.returncode == 0, result.stderr
-    parts = result.stdout.split("-----\n")
-    assert len(parts) == len(blocks) == 11
-    return parts
+    """Texts that the blocks of the page print, a part for each block; without the first, for pip."""
+    parts = run_blocks(blocks_of("docs/python.md", "python"), tmp_path_factory.mktemp("page"))
+    assert len(parts) == 12
+    return parts[1:]
 
 
 def numbers(text: str) -> list[float]:
@@ -95,9 +92,8 @@ def test_all_actions_are_on_the_page():
 
 
 def test_the_block_of_the_readme_runs(tmp_path):
-    (block,) = BLOCK.findall((ROOT / "README.md").read_text())
-    result = run(f"{block}\nassert len(samples) > 100", tmp_path)
-    assert result.returncode == 0, result.stderr
+    (block,) = blocks_of("README.md", "python")
+    run_blocks([block._replace(text=f"{block.text}\nassert len(samples) > 100")], tmp_path)
 
 
 def test_another_python_does_not_find_the_packages(tmp_path):
@@ -106,35 +102,25 @@ def test_another_python_does_not_find_the_packages(tmp_path):
 
 
 def test_the_page_on_speed_times_a_tick(tmp_path):
-    (block,) = BLOCK.findall((ROOT / "docs/slow.md").read_text())
-    assert re.search(r"^\d+ us a tick of 1000 us$", run(block, tmp_path).stdout, re.MULTILINE)
+    (printed,) = run_blocks(blocks_of("docs/slow.md", "python"), tmp_path)
+    assert re.fullmatch(r"\d+ us a tick of 1000 us\n", printed)
 
 
 def test_page_on_many_worlds_shows_true_output(tmp_path):
-    found = BLOCK.findall((ROOT / "docs/many_worlds.md").read_text())
-    elsewhere = ("rospy", "belt.world")  # in test_predict_service.py and test_foreign_states.py
-    blocks = [block for block in found if not any(word in block for word in elsewhere)]
+    blocks = [block for block in blocks_of("docs/replay_and_fork.md", "python") if "rospy" not in block.text]
     assert len(blocks) == 5
-    result = run("\n".join(blocks), tmp_path)
-    assert result.returncode == 0, result.stderr
-    lines = [line for line in result.stdout.splitlines() if re.match(r"500 |True|[0-9a-f]{32}$", line)]
-    assert lines[0] == "500 True" and lines[-1] == "True"
-    assert len({*lines[1:3]}) == 2, "the forks go different ways"
+    _, _, forks, *_ = run_blocks(blocks, tmp_path)
+    assert len(set(forks.split())) == 2, "the forks differ"
 
 
 def test_page_on_environments_shows_true_output(tmp_path):
-    blocks = BLOCK.findall((ROOT / "docs/gym.md").read_text())
-    assert len(blocks) == 7
-    result = run("\nprint('-----')\n".join(blocks), tmp_path)
-    assert result.returncode == 0, result.stderr
-    first, _, _, own, varied, vector, mode = result.stdout.split("-----\n")
+    first, _, _, own, varied, _, _ = run_blocks(blocks_of("docs/gym.md", "python"), tmp_path)
     assert first.startswith("['box/pose', 'goal', 'hand', 'kuka_lwr/joints'] False\n(")
     assert own.startswith("Box(-1.0, 1.0, (7,), float32) Box(0.0, 2.0, (1,), float32) [0.15")
     masses = numbers(varied)
     assert len({*masses, 0.8}) == 3 and all(0.7 * 0.8 <= mass <= 1.3 * 0.8 for mass in masses)
-    assert (vector, mode) == ("(4, 3) (4,)\n", "AutoresetMode.SAME_STEP\n")
 
 
 def test_random_variation_on_the_page_equals_that_of_the_example():
-    (block,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/gym.md").read_text(), re.DOTALL)
-    assert yaml.safe_load(block) == yaml.safe_load(VARIATION.read_text())
+    (block,) = blocks_of("docs/gym.md", "yaml")
+    assert yaml.safe_load(block.text) == yaml.safe_load(VARIATION.read_text())

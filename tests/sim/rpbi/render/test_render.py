@@ -22,7 +22,7 @@ from rpbi.geometry import Pose
 from rpbi.render.camera import DepthNoise, Intrinsics
 from rpbi.render.frame import Camera
 from rpbi.render.mirror import Mirror
-from rpbi.render.renderers import open_renderer
+from rpbi.render.renderers import TransparentShape, open_renderer
 from rpbi.world import World
 
 HALF_EXTENTS_M = (0.3, 0.2, 0.1)
@@ -31,6 +31,10 @@ BLUE = [0.1, 0.1, 0.9, 1.0]
 
 BALL_RADIUS_M = 0.2
 CORNERS_M = [[-0.2, -0.2, 0.0], [0.2, -0.2, 0.0], [0.0, 0.2, 0.0]]
+FIRST_GLASS = {  # has the body id of the image that is drawn to try EGL
+    "name": "more_glass",
+    "createVisualShape": {"shapeType": "GEOM_BOX", "halfExtents": [0.3, 0.3, 0.01], "rgbaColor": [0.1, 0.9, 0.1, 0.5]},
+}
 PLANE = {"name": "plane", "createVisualShape": {"shapeType": "GEOM_PLANE", "planeNormal": [0.0, 0.0, 1.0]}}
 TRIANGLE = {
     "name": "triangle",
@@ -60,12 +64,11 @@ def make_world(folder: Path) -> World:
     return World.from_file(
         worlds.write_world(
             folder,
-            visual=(PLANE, TRIANGLE),
+            visual=(FIRST_GLASS, PLANE, TRIANGLE),
             collision=(worlds.FLOOR,),
             dynamic=(
                 worlds.ball("ball", BALL_RADIUS_M),
                 coloured_box("glass", [0.9, 0.1, 0.1, 0.25], (0.3, 0.3, 0.01)),
-                coloured_box("more_glass", [0.1, 0.9, 0.1, 0.5], (0.3, 0.3, 0.01)),
                 coloured_box("hidden", [1.0, 1.0, 1.0, 0.0]),
                 coloured_box("red", RED),
                 coloured_box("blue", BLUE),
@@ -520,6 +523,23 @@ def test_first_image_of_a_renderer_equals_the_following_ones(tmp_path):
     above = Pose((0.0, 0.0, 2.0), (1.0, 0.0, 0.0, 0.0))
     first, second = (renderer.draw(INTRINSICS, above, segmentation=False).rgba.copy() for _ in range(2))
     assert np.array_equal(first, second)
+
+
+def test_large_image_has_depths_everywhere_behind_glass():
+    """PyBullet enlarges images of 1024 x 768 pixels; depths with transparent shapes are read separately."""
+    large = Intrinsics(width_px=1280, height_px=900, near_m=0.1, far_m=10.0)
+    renderer = open_renderer([Camera("large", "", large)])
+    pb = renderer.pb
+    made = [(2.0, [5.0, 5.0, 0.1], [*RED[:3], 1.0]), (1.0, [0.2, 0.1, 0.01], [*BLUE[:3], 0.5])]
+    for z_m, half_extents, rgba in made:
+        shape = pb.createVisualShape(pb.GEOM_BOX, halfExtents=half_extents, rgbaColor=rgba)
+        body_id = pb.createMultiBody(0.0, -1, shape, [0.0, 0.0, z_m])
+    plain = renderer.draw(large, Pose()).depth_buffer
+    transparent = (TransparentShape(body_id, -1, 0, tuple(rgba)),)
+    glass = renderer.draw(large, Pose(), transparent=transparent).depth_buffer
+    assert (glass < 1.0).all() and np.abs(glass - plain).max() > 0.01  # the glass is nearer than the wall
+    left, upper = (slice(None), slice(0, 300)), (slice(0, 200), slice(None))
+    assert np.array_equal(glass[left], plain[left]) and np.array_equal(glass[upper], plain[upper])
 
 
 def test_camera_noise_changes_depth_identically_in_another_process(tmp_path):

@@ -94,7 +94,7 @@ def test_the_tip_goes_where_the_scene_leads_it(env):
 
 
 def test_the_scene_of_the_docs_succeeds(tmp_path, monkeypatch):
-    text = (CONSOLE.parents[3] / "docs/examples.md").read_text()
+    text = (CONSOLE.parents[3] / "docs/scenes.md").read_text()
     (code,) = re.findall(r"```python\n# my_lab/lift.py\n(.*?)```", text, re.DOTALL)
     (tmp_path / "lift.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)

@@ -13,6 +13,7 @@ def bench(
     *names: Annotated[str, Argument("[NAME ...]", offers="benchmarks", files="*")],
     quick: Annotated[bool, Argument("")] = False,
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*")] = None,
+    page: Annotated[bool, Argument("")] = False,
 ) -> int:
     """Runs benchmarks, and prints each measured figure with its lower bound, if it has one.
 
@@ -22,6 +23,8 @@ def bench(
             verify
         quick: measure for a shorter time, which is less accurate
         json: file to which the figures are written
+        page: also write the figures, with machine, date and commit, to docs/results.md, which keeps the figures of
+            other benchmarks
     """
     sys.path.insert(0, str(workspace() / "dev/benchmarks"))
     benchmarks = importlib.import_module("run")
@@ -29,4 +32,4 @@ def bench(
     for name in names:
         if name not in known:
             raise UsageError(f"there is no benchmark '{name}'; there are {', '.join(known)}")
-    return int(benchmarks.run(names, quick, json))
+    return int(benchmarks.run(names, quick, json, page))

@@ -4,7 +4,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import PyKDL
+
+from custom_ros_tools.errors import MissingDependency
+
+try:
+    import PyKDL as PyKDL  # also for the solver
+except ImportError:
+    raise MissingDependency("PyKDL", "apt install python3-pykdl; pip has no package of it") from None
 
 from ik_ros.problem import IKProblem
 from robot_model.chain import Chain

@@ -5,10 +5,8 @@ import random
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-import PyKDL
-
 from custom_ros_tools.schema import Count
-from ik_ros.chain.kdl import Goal
+from ik_ros.chain.kdl import Goal, PyKDL
 from ik_ros.chain.levenberg_marquardt import levenberg_marquardt
 from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.problem import IKProblem

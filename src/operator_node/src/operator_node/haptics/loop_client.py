@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
+from custom_ros_tools.child_process import python_module
 from robot_model.geometry import Vector
 
 from .link import Link, LoopCommand, LoopInput, LoopReport, Setup
@@ -119,7 +120,7 @@ class LoopClient:
     def _start(self) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
-            program = [sys.executable, "-P", "-m", LOOP, str(theirs.fileno()), *self._arguments]
+            program = python_module(LOOP, str(theirs.fileno()), *self._arguments)
             self._process = subprocess.Popen(
                 program,
                 stdin=subprocess.DEVNULL,

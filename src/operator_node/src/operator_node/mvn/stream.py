@@ -125,7 +125,7 @@ class StreamDecoder:
         if person not in self._people and len(self._people) >= self._max_people:
             oldest = min(self._people, key=self._people.__getitem__)
             if received - self._people[oldest] < LONG_GONE:
-                raise PacketError("too many people", f"person {person} beside {sorted(self._people)}")
+                raise PacketError("too many people", f"person {person} in addition to {sorted(self._people)}")
             self._forget(oldest)
         self._people[person] = received
 

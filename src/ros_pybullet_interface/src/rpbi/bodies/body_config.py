@@ -1,8 +1,9 @@
 """Keys of every body in YAML."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from typing_extensions import Self
 
 from custom_ros_tools.schema import ConfigModel, Expects, KeyedError, ListOf, Name
 from rpbi.config.sensors import SensorConfig

@@ -163,7 +163,8 @@ class SoftObject(Body):
         elif anchor.link < len(body.joint_indices):
             link = anchor.link
         else:
-            raise ValueError(f"'{body.name}' has {len(body.joint_indices)} links beside the base, got {anchor.link}")
+            count = len(body.joint_indices)
+            raise ValueError(f"'{body.name}' has {count} links in addition to the base, got {anchor.link}")
         return int(self.pb.createSoftBodyAnchor(self.body_id, anchor.node, body.body_id, link))
 
 

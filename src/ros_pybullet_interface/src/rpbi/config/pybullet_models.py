@@ -7,9 +7,10 @@ bodies. A test checks that PyBullet accepts each field with values of the field'
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, model_validator
+from typing_extensions import Self
 
 from custom_ros_tools.schema import (
     AlsoTakes,

@@ -6,9 +6,10 @@ import inspect
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
+from typing_extensions import Self
 
 from custom_ros_tools.schema import (
     AlsoTakes,
@@ -120,7 +121,7 @@ class StaticFrame(ConfigModel):
 
 
 class ControlsConfig(ConfigModel):
-    """The window with buttons, see docs/controls.md."""
+    """The window with buttons, see docs/windows.md."""
 
     robot_name: Text | None = optional("Robot whose joints the window shows first. By default, the first robot.")
 

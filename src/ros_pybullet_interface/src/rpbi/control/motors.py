@@ -181,7 +181,7 @@ class Motors:
     def switch(self, mode: int) -> None:
         """Changes the control mode, and drops all targets.
 
-        In position modes the robot then holds its measured positions. Under velocity control it stands still, and
+        In position modes the robot then holds its measured positions. Under velocity control it does not move, and
         under torque control it moves freely.
         """
         self.mode = mode
@@ -280,7 +280,7 @@ class Motors:
     def release(self, indices: Iterable[int]) -> None:
         """Ends `track` for some joints; their motors then follow the control mode's targets again.
 
-        In position modes the joints hold the last tracked position. Under velocity control they stand still.
+        In position modes the joints hold the last tracked position. Under velocity control they do not move.
         """
         for index in indices:
             if self.mode == pybullet.VELOCITY_CONTROL:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, iterate
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.child_process import python_module, start_child
 from custom_ros_tools.errors import InterfaceError
 
 from .checks import check_action
@@ -214,7 +214,7 @@ class _Process:
         ours, theirs = Pipe()
         with theirs:
             self._process = start_child(
-                [sys.executable, "-P", "-m", "rpbi.gym.vector_worker", str(theirs.fileno())],
+                python_module("rpbi.gym.vector_worker", str(theirs.fileno())),
                 signal.SIGKILL,
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},

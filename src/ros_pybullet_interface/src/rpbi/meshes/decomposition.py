@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pybullet
 
+from custom_ros_tools.child_process import python_module
 from custom_ros_tools.files import temporary_folder
 from robot_model.mesh_cache import cached, content_hash
 
@@ -63,7 +64,7 @@ def _decompose(mesh: str, parameters: Mapping[str, float], folder: Path) -> None
     with open(source, "w", encoding="utf-8") as file:
         file.writelines(f"v {x!r} {y!r} {z!r}\n" for x, y, z in numbers)
         file.writelines(f"f {' '.join(of_corners[at : at + 3])}\n" for at in range(0, len(of_corners), 3))
-    command = [sys.executable, "-P", "-m", __name__, str(source), str(parts), json.dumps(parameters)]
+    command = python_module(__name__, str(source), str(parts), json.dumps(parameters))
     try:
         done = subprocess.run(
             command,

@@ -10,13 +10,12 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.child_process import limit_resource, python_module, start_child
 from robot_model.mesh_cache import cache_folder, content_hash
 
 TRIAL = 3
@@ -65,9 +64,7 @@ def limit_resources(cpu_s: int) -> None:
         cpu_s: Limit of the processor time [s].
     """
     for limit, most in ((resource.RLIMIT_AS, MAX_BYTES), (resource.RLIMIT_CPU, cpu_s), (resource.RLIMIT_CORE, 0)):
-        already = resource.getrlimit(limit)[0]
-        most = most if already == resource.RLIM_INFINITY else min(already, most)
-        resource.setrlimit(limit, (most, most))
+        limit_resource(limit, most)
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
@@ -115,7 +112,7 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
         The latter has no meaning if the process finished all meshes.
     """
     reading, writing = os.pipe()
-    command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
+    command = python_module(__name__.rpartition(".")[0], str(writing))
     with open(reading, "rb") as report:
         try:
             process = start_child(

@@ -1,6 +1,7 @@
-"""Generates the reference page of all YAML files and their keys, and the JSON Schemas of these files."""
+"""Generates the reference pages of all YAML files and their keys, and the JSON Schemas of these files."""
 
 import re
+import textwrap
 from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,43 +22,20 @@ from rpbi.config.object_entry import FILES
 from rpbi.world.legacy import MAIN, old_keys
 from rpbi.world.schemas import WORLD, file_schemas, kind_of, schemas, sections
 
+from .config_texts import (
+    BEGINNINGS,
+    COMMON,
+    GUIDES,
+    INTRODUCTION,
+    NODES,
+    NODES_EXAMPLE,
+    OBJECTS,
+    OVERVIEW,
+    PAGES,
+    SHARED,
+)
 from .markdown import WRITTEN_BY, block, code, link, page, table
 
-INTRODUCTION = """\
-Every YAML file of a world and every key in it. For worlds see [worlds.md](worlds.md), for their topics and services
-[topics_and_services.md](topics_and_services.md).
-
-- Keys that are not listed here are errors.
-- A key may be left out unless it is required. Where the default is empty, the meaning says what holds without it, or
-  PyBullet's own default does.
-- camelCase keys are arguments of the PyBullet function of the same name.
-- Constants are given by name or by PyBullet's number, true and false as 1 and 0 too, whole numbers wherever a number is
-  expected. YAML reads `1e-3` as text: write `1.0e-3`.
-- An entry of a list of files is a file name, or a mapping with `file` and the keys that differ. `null` removes a
-  key of the file, such as `controllers: null`.
-- Files are looked for beside the file that names them, in `setAdditionalSearchPath` and in PyBullet's data;
-  `{package}/path` and `package://package/path` work everywhere.
-- Editors complete, explain and check these keys, see [worlds.md](worlds.md#in-an-editor)."""
-NODES = "Keys of nodes in `~config`; for the nodes see [custom_ros_tools.md](custom_ros_tools.md)."
-GUIDES = {
-    "world": "worlds.md",
-    "robot": "robots.md",
-    "urdf": "worlds.md",
-    "soft_object": "soft_bodies.md",
-    "object": "extending.md",
-    "rgbd_sensor": "cameras.md",
-    "configureDebugVisualizer": "gui.md",
-    "resetDebugVisualizerCamera": "gui.md",
-    "planar_base": "bases.md",
-    "enabled_joint_force_torque_sensors": "force_torque.md",
-    "joint_trajectory_controller": "trajectories.md",
-    "contacts": "contacts.md",
-    "attachments": "hands.md",
-    "coupled_joints": "hands.md",
-    "changeDynamics": "dynamics.md",
-    "sensors": "extending.md",
-}
-"""Page that explains the keys under a heading of the reference page, keyed by heading."""
 HEAD = ("key", "type", "default", "meaning")
 FIRST_EXAMPLES = "basic_example_kuka_lwr"
 """Folder from which the example of each kind of file is taken first; other folders follow."""
@@ -82,10 +60,12 @@ class Place(NamedTuple):
 
 Places = dict[str, Place]
 """Places, keyed by the name of the mapping's definition, which is the same in all files."""
+Homes = Mapping[str, str]
+"""Page of each section, keyed by heading."""
 
 
 def config_files(root: Path) -> dict[Path, str]:
-    """Returns the texts of the page and of all schemas, keyed by file path.
+    """Returns the texts of the pages and of all schemas, keyed by file path.
 
     Args:
         root: Folder of the workspace.
@@ -94,7 +74,7 @@ def config_files(root: Path) -> dict[Path, str]:
     return {
         **schema_texts(root / "src/ros_pybullet_interface/schema", schemas()),
         **schema_texts(root / "src/custom_ros_tools/schema", nodes),
-        root / "docs/config_reference.md": config_page(file_schemas(), nodes, _examples(root)),
+        **{root / "docs" / name: text for name, text in config_pages(file_schemas(), nodes, _examples(root)).items()},
     }
 
 
@@ -113,8 +93,10 @@ def _examples(root: Path) -> dict[str, str]:
     return examples
 
 
-def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], examples: Mapping[str, str]) -> str:
-    """Returns the text of the reference page.
+def config_pages(
+    files: Mapping[str, Schema], nodes: Mapping[str, Schema], examples: Mapping[str, str]
+) -> dict[str, str]:
+    """Returns the texts of the reference pages, keyed by page.
 
     Args:
         files: Schema of each kind of file, keyed by kind.
@@ -122,32 +104,61 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
         examples: YAML text to show for some kinds of files, keyed by kind.
     """
     places = _places(files)
-    parts = [WRITTEN_BY, "# Configuration reference", INTRODUCTION, "## Files", _overview(files)]
+    constants = {each["kind"] + "s": constants_in(each) for each in _constants(list(files.values()))}
+    homes = {
+        **dict.fromkeys(constants, COMMON),
+        **{each.heading: _home(each) for each in places.values()},
+        **{kind: PAGES.get(kind, OBJECTS) for kind in files},
+    }
+    parts: dict[str, list[str]] = {name: [] for name in BEGINNINGS}
     for kind, schema in files.items():
-        parts += [f"## {kind}", _guide(kind), block("yaml", examples[kind]) if kind in examples else ""]
-        parts += [_keys(schema, schema, places), _old_keys(kind)]
+        shown = block("yaml", examples[kind]) if kind in examples else ""
+        parts[homes[kind]] += [f"## {kind}", _guide(kind), shown, _keys(schema, schema, places, homes), _old_keys(kind)]
         for place in places.values():
             if place.files == [kind]:
-                parts += [f"### {place.heading}", _guide(place.heading), _keys(place.mapping, place.root, places)]
-    parts += ["## Mappings that several files have"]
+                keys = _keys(place.mapping, place.root, places, homes)
+                parts[homes[kind]] += [f"### {place.heading}", _guide(place.heading), keys]
     for place in sorted(places.values(), key=lambda place: place.heading.lower()):
         if len(place.files) > 1:
-            owners = f"Of {', '.join(map(link, place.files))}. {_guide(place.heading)}"
-            parts += [f"### {place.heading}", owners, _keys(place.mapping, place.root, places)]
-    families = {each["kind"]: constants_in(each) for each in _constants(list(files.values()))}
-    parts += ["## Constants"]
-    for kind, names in sorted(families.items()):
-        parts += [f"### {kind}s", ", ".join(map(code, names)) + "."]
-    parts += ["## Nodes", NODES]
+            owners = ", ".join(link(kind, homes[kind]) for kind in place.files)
+            about = f"A mapping of {owners}. {_guide(place.heading)}"
+            keys = _keys(place.mapping, place.root, places, homes)
+            parts[homes[place.heading]] += [f"## {place.heading}", about, keys]
+    parts[COMMON] += ["## Constants"]
+    for family, names in sorted(constants.items()):
+        parts[COMMON] += [f"### {family}", ", ".join(map(code, names)) + "."]
+    parts[NODES] += [block("xml", NODES_EXAMPLE), *_nodes(nodes)]
+    overview = [WRITTEN_BY, "# Configuration reference", INTRODUCTION, "## Files", _overview(files, homes), _others()]
+    return {OVERVIEW: page(overview), **{name: _page(name, each) for name, each in parts.items()}}
+
+
+def _home(place: Place) -> str:
+    """Returns the page of a mapping: that of its only kind of file, or a page of shared mappings."""
+    if len(place.files) == 1:
+        return PAGES.get(place.files[0], OBJECTS)
+    return SHARED.get(place.heading, COMMON)
+
+
+def _page(name: str, parts: list[str]) -> str:
+    title, beginning = BEGINNINGS[name]
+    rules = f"For rules that hold for all files see [{OVERVIEW}]({OVERVIEW})."
+    first = textwrap.fill(f"{beginning} {rules}", 120, break_on_hyphens=False)
+    return page([WRITTEN_BY, f"# {title}", first, *parts]).replace(f"]({name}#", "](#")
+
+
+def _nodes(nodes: Mapping[str, Schema]) -> Iterator[str]:
+    """Yields headings and tables of the nodes' keys."""
     listed: set[str] = set()
     for node, schema in nodes.items():
         places = _places({node: schema})
-        parts += [f"### {node}", _keys(schema, schema, places)]
+        homes = {place.heading: NODES for place in places.values()}
+        yield f"## {node}"
+        yield _keys(schema, schema, places, homes)
         for name, place in places.items():
             if name not in listed:  # else another node has the same mapping
-                parts += [f"#### {place.heading}", _keys(place.mapping, schema, places)]
+                yield f"### {place.heading}"
+                yield _keys(place.mapping, schema, places, homes)
         listed.update(places)
-    return page(parts)
 
 
 def _places(files: Mapping[str, Schema]) -> Places:
@@ -188,39 +199,46 @@ def _guide(heading: str) -> str:
     return f"How to use it: [{page_name}]({page_name})." if page_name else ""
 
 
-def _overview(files: Mapping[str, Schema]) -> str:
+def _overview(files: Mapping[str, Schema], homes: Homes) -> str:
     lists = {kind_of(section): section for section in sections()}
     rows = []
     for kind, schema in files.items():
         named_by = "the main file itself" if kind == WORLD else code(lists[kind])
-        rows.append((link(kind), named_by, schema["description"], code(f"{kind}.schema.json")))
-    return table(("file", "named in the main file by", "what it is", "schema for editors"), rows)
+        rows.append((link(kind, homes[kind]), named_by, schema["description"], code(f"{kind}.schema.json")))
+    return table(("file", "named in the main file by", "meaning", "schema for editors"), rows)
 
 
-def _keys(mapping: Schema, root: Schema, places: Places) -> str:
+def _others() -> str:
+    """Returns a sentence with links to the pages that are not about kinds of files."""
+    common, nodes = (f"[{BEGINNINGS[name][0].partition(': ')[2]}]({name})" for name in (COMMON, NODES))
+    return f"Two more pages have {common}, and the configuration of {nodes}."
+
+
+def _keys(mapping: Schema, root: Schema, places: Places, homes: Homes) -> str:
     rows = []
     for key, value in _values(mapping).items():
         meaning = resolved(value, root)["description"] if "description" not in value else value["description"]
-        rows.append((code(key), _type(key, value, root, places), _default(key, mapping), meaning))
+        rows.append((code(key), _type(key, value, root, places, homes), _default(key, mapping), meaning))
     if mapping.get("additionalProperties") is True:
         rows.append(("others", "", "", "Keys of its class."))
     return table(HEAD, rows)
 
 
-def _type(key: str, value: Schema, root: Schema, places: Places) -> str:
+def _type(key: str, value: Schema, root: Schema, places: Places, homes: Homes) -> str:
     if value.get("items", {}).get("expects") == FILES:
-        return f"list of files, each {link(kind_of(key))}"
+        return f"list of files, each {link(kind_of(key), homes[kind_of(key)])}"
     families = list(_constants(value))
     if families:
         several = " or several" if any("anyOf" in each for each in families) else ""
-        return f"{link(families[0]['kind'] + 's')}, one{several}"
+        return f"{link(families[0]['kind'] + 's', COMMON)}, one{several}"
     unit = unit_in(value)
     words = type_name(value, detailed=True).removeprefix("a ") + (f" [{unit}]" if unit else "")
     mapping = mapping_in(value, root)
     if mapping is None:
         return words
     place = places.get(name_of(mapping))
-    return f"{words}, see {link(place.heading if place else key)}"
+    heading = place.heading if place else key
+    return f"{words}, see {link(heading, homes[heading])}"
 
 
 def _default(key: str, mapping: Schema) -> str:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from custom_ros_tools.child_process import is_stopped
+from custom_ros_tools.child_process import is_stopped, python_module
 from rpbi.samples import SceneSample
 from rpbi.world.load_log import LoadLogReader, LogEntry
 
@@ -70,7 +70,7 @@ class RenderClient:
         self._cameras = {camera.name: camera for camera in cameras}
         self._log = load_log
         self._body_ids = body_ids
-        self._command = ("-P", "-m", "rpbi.render", "--sink", sink, *arguments)
+        self._command = python_module("rpbi.render", "--sink", sink, *arguments)
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._use_egl = use_egl
@@ -208,7 +208,7 @@ class RenderClient:
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, *self._command, "--socket", str(theirs.fileno())],
+                [*self._command, "--socket", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # PyBullet and its plugin print a lot
                 pass_fds=[theirs.fileno()],

@@ -85,12 +85,12 @@ class Mirror:
         if entry.what == "world":
             self._bodies.clear()
             self._shown.clear()
-            self._transparency.update(set())
         self._shown.pop(entry.name, None)
         try:
             apply(self._pb, self._bodies, self._as_drawn(entry))
             if entry.what == "world":
                 self._soft_shapes = SoftShapes(self._pb)
+                self._transparency = Transparency(self._pb)  # PyBullet has forgotten all earlier shapes
             elif entry.what == "add":
                 self._soft_shapes.disable_physics(self._bodies[entry.name])
         except Exception as error:

@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from custom_ros_tools.child_process import limit_resource
 from custom_ros_tools.errors import InterfaceError
 
 from .session import RecordedPart, ReplayResult
@@ -69,7 +70,7 @@ def limit_cpu_time(cpu_s: int) -> None:
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5))
+    limit_resource(resource.RLIMIT_CPU, limit, limit + 5)
 
 
 class TooSlowError(InterfaceError):

@@ -33,8 +33,8 @@ for your own world.
 - A message that has NaN, an unknown joint or the wrong number of values changes nothing and is logged. A
   service that refuses a request answers `success: false` and the reason."""
 WINDOW = """\
-With `connection_mode: GUI`, see [gui.md](gui.md); without a window nothing is published, and changes of the view are
-refused."""
+With `connection_mode: GUI`, see [windows.md](windows.md#pybullets-own-window). Without a window nothing is published,
+and changes of the view are refused."""
 OBJECTS = """\
 The column *of* names types of objects, see [concepts.md](concepts.md#bodies-and-sensors). Objects of your own types and
 your own sensors also have those that their classes name, see [extending.md](extending.md)."""
@@ -48,7 +48,7 @@ TF where `object_tf` names a frame that a body or camera follows."""
 OTHERS = """\
 The nodes of custom_ros_tools, which remap joint states and publish transforms and markers, are in
 [custom_ros_tools.md](custom_ros_tools.md#nodes). The commands of rpbi_utils have no topics of their own, see
-[replay.md](replay.md) and [data.md](data.md). Its nodes are in [interpolation.md](interpolation.md),
+[replay_and_fork.md](replay_and_fork.md) and [data.md](data.md). Its nodes are in [interpolation.md](interpolation.md),
 [force_torque.md](force_torque.md#a-zero-and-the-weight-of-a-payload), [tracking.md](tracking.md) and
 [real_robots.md](real_robots.md#the-stand-in)."""
 HEADINGS = {PUBLISHES: "Published", SUBSCRIBES: "Subscribed", SERVES: "Services"}
@@ -87,7 +87,7 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
     parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES.items())), FOLLOWED]
     parts += ["## Parameters", _parameters(), "## Other nodes", OTHERS, "## Messages and services of ours"]
     for name, text in definitions.items():
-        parts += [f"### {name}", block("", text)]
+        parts += [f"### {name}", block("text", text)]
     return page(parts)
 
 

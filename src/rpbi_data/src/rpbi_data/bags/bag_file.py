@@ -10,8 +10,8 @@ import struct
 from collections.abc import Collection, Iterator
 from typing import BinaryIO, NamedTuple
 
+import lz4.frame
 import numpy as np
-import roslz4
 
 from .limits import MAX_CONNECTIONS, LimitError
 from .times import PER_SECOND, ClockStep, set_back
@@ -218,11 +218,14 @@ class NotABagError(ValueError):
 
 
 def _unfold_lz4(data: bytes, size: int) -> bytes:
-    unfolder, pieces, left = roslz4.LZ4Decompressor(), [], size
+    unfolder, pieces, left = lz4.frame.LZ4FrameDecompressor(), [], size
     for start in range(0, len(data), _PIECE):
-        pieces.append(unfolder.decompress(data[start : start + _PIECE]))
+        try:
+            pieces.append(unfolder.decompress(data[start : start + _PIECE]))
+        except RuntimeError as error:
+            raise ValueError(f"LZ4: {error}") from None
         left -= len(pieces[-1])
-        if left < 0:
+        if left < 0 or unfolder.eof:
             break
     return b"".join(pieces)
 

@@ -45,7 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("bag", type=Path, metavar="BAG")
     parser.add_argument("--topics", nargs="+", metavar="TOPIC", help="default: all that hold no binary data")
     parser.add_argument("--format", choices=FORMATS, default=FORMATS[0], help="default: %(default)s")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: BAG_tables, beside BAG.bag")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="default: BAG_tables, in the folder of BAG.bag")
     parser.add_argument("--images", action="store_true", help="topics with binary data too (not CSV)")
     parser.add_argument("--any-size", action="store_true", help="also if it unfolds to 255 times its size and 1 GiB")
     parser.add_argument("--quiet", action="store_true", help="no progress bar and no list of files")

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from custom_ros_tools.child_process import limit_resource
 from custom_ros_tools.foreign import MAX_ENTRIES, printable
 
 BASE_TIME_S = 30
@@ -140,7 +141,7 @@ def _run(task: Callable[[], Iterable[CheckLine]], writing: int, limits: tuple[in
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
         if limits is not None:
-            resource.setrlimit(resource.RLIMIT_CPU, (limits[0], limits[0] + 5))
+            limit_resource(resource.RLIMIT_CPU, limits[0], limits[0] + 5)
             resource.setrlimit(resource.RLIMIT_DATA, (_own_memory() + limits[1],) * 2)
         with open(writing, "w", encoding="utf-8") as lines:
             for line in task():

@@ -13,9 +13,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr, unescape
 
-import rospkg
-
-from custom_ros_tools.config import load_config, read_file
+from custom_ros_tools.config import load_config, read_file, ros_packages
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.foreign import MAX_PATH_BYTES, load_foreign_json, path_below, printable, read_below
@@ -192,7 +190,7 @@ def _described(description: str) -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def _package_folders() -> tuple[Path, ...]:
     """Returns the folders of all ROS packages, of example-robot-data and of PyBullet's data."""
-    packages = rospkg.RosPack()
+    packages = ros_packages()
     folders = [*(packages.get_path(name) for name in packages.list()), *pybullet_data()]
     with suppress(ValueError):  # not installed
         folders.append(str(resolve_package(f"{{{ASSETS}}}/")))

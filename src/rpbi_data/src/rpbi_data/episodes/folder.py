@@ -17,10 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rospkg
 import yaml
 
-from custom_ros_tools.console.modules import workspace
+from custom_ros_tools.config import SOURCES, ros_packages
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.foreign import entries_of, path_below, printable, read_below
@@ -363,20 +362,23 @@ def _numbers(folder: Path, pattern: re.Pattern[str]) -> list[int]:
 def versions() -> dict[str, str]:
     """Returns the versions of this workspace, PyBullet, Python and numpy."""
     return {
-        "workspace": rospkg.RosPack().get_manifest("rpbi_data").version,
+        "workspace": ros_packages().get_manifest("rpbi_data").version,
         "pybullet": version("pybullet"),
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
 
 
-def git_state(folder: Path | None = None) -> str:
-    """Returns the commit of a workspace, with ` changed` appended if files differ from the commit; empty if unknown."""
+def git_state(folder: Path | None = SOURCES) -> str:
+    """Returns the commit of a folder, by default of this workspace; empty if there is none, as for an installed one.
+
+    ` changed` is appended if files differ from the commit.
+    """
+    if folder is None:
+        return ""
 
     def git(*words: str) -> str:
-        done = subprocess.run(
-            ["git", "-C", str(folder or workspace()), *words], capture_output=True, text=True, timeout=20.0
-        )
+        done = subprocess.run(["git", "-C", str(folder), *words], capture_output=True, text=True, timeout=20.0)
         return done.stdout.strip() if done.returncode == 0 else ""
 
     try:

@@ -6,7 +6,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -14,7 +13,7 @@ from multiprocessing.connection import Pipe, wait
 from pathlib import Path
 from typing import Any
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.child_process import python_module, start_child
 from custom_ros_tools.foreign import path_below
 from rpbi_data.episodes.errors import EpisodeError
 from rpbi_data.episodes.folder import EpisodeFolder
@@ -55,7 +54,7 @@ class Child:
             raise EpisodeError(path, "expected an ordinary file")
         with theirs, open(path, "ab") as log:
             self._process = start_child(
-                [sys.executable, "-P", "-m", module, str(theirs.fileno()), *arguments],
+                python_module(module, str(theirs.fileno()), *arguments),
                 signal.SIGKILL,
                 pass_fds=[theirs.fileno()],
                 env=environment,

@@ -34,7 +34,7 @@ def score(
     A ROS master is not needed. Success is determined from the true state of the simulation. The same seed leads to the
     same episode in any process, also with the scene's launch file: `./rpbi launch cup seed:=17`. The picture
     FOLDER/SCENE_failures.png shows the last camera images of failed episodes. After Ctrl-C, the command reports the
-    episodes that have ended. See docs/examples.md.
+    episodes that have ended. See docs/scenes.md.
 
     Usage:
         ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--noise] [--jobs N]

@@ -9,7 +9,7 @@ ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in TASKS}
 """Name of each environment's folder below `FOLDER`, indexed by the environment's id."""
 
 SCENE_ENVIRONMENTS = {f"rpbi/{''.join(map(str.capitalize, name.split('_')))}-v0": name for name in SCENES}
-"""Names of the scenes that are registered as environments, indexed by the environment's id; see docs/examples.md."""
+"""Names of the scenes that are registered as environments, indexed by the environment's id; see docs/scenes.md."""
 
 for _id, _folder in ENVIRONMENTS.items():
     register(_id, f"{FOLDER}/{_folder}/world.yaml", f"{FOLDER}/{_folder}/task.yaml")

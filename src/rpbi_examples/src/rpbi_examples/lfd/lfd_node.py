@@ -21,12 +21,12 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.end_launch import end_launch
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from custom_ros_tools.transforms import Array
 from rpbi_examples.motions import PlanarPose
-from rpbi_examples.ros.human_interaction import interrupt_roslaunch
 from rpbi_examples.ros.joint_targets import wait_until_ready
 
 from .arm_topics import ORIGIN, TARGET, TIP, Arm, planar
@@ -111,7 +111,7 @@ class LfdNode:
         if missed and not rospy.is_shutdown():
             raise InterfaceError(f"the box was not at its goal: {'; '.join(missed)}")
         if self._rounds and not rospy.is_shutdown():
-            interrupt_roslaunch()
+            end_launch("all executions are done")
 
     # --- Keys
 

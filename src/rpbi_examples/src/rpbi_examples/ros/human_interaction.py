@@ -1,14 +1,9 @@
 """Starts an arm and a haptic device, shows forces and heights, and evaluates each press of the arm on a box."""
 
-import contextlib
-import os
-import signal
 import threading
 import time
-import xmlrpc.client
 from collections import deque
 from pathlib import Path
-from typing import Any
 
 import rospy
 import tf2_ros
@@ -17,6 +12,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Empty, SetBool, Trigger
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.end_launch import end_launch
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.services import call_service, get_srv_handler
@@ -34,8 +30,6 @@ MAX_BUFFERED = 1000
 """Size of the buffers in which forces and poses wait for the other data with the same time."""
 WINDOW_S = 20.0
 """Time span shown in the window [s]."""
-MAX_FAREWELL_S = 15.0
-"""Time for which the node waits for roslaunch to stop it [s]; afterwards, roslaunch kills an interrupted node."""
 LEFT_S = 2.0
 """Time after the scripted device has disconnected at which the press counts as over [s]."""
 MAX_ERROR = 0.05
@@ -79,11 +73,7 @@ class Watch:
             pass
         if self._failure:
             raise InterfaceError(self._failure)
-        if not rospy.is_shutdown() and interrupt_roslaunch():
-            left = threading.Event()
-            rospy.on_shutdown(left.set)
-            left.wait(MAX_FAREWELL_S)
-        rospy.signal_shutdown("the press is over")
+        end_launch("the press is over")
 
     def _begin(self) -> None:
         """Waits for sensor, guard and arm. Then switches on IK and haptics, so that the arm follows the handle."""
@@ -171,7 +161,7 @@ class Watch:
     def _show(self) -> None:
         import matplotlib.pyplot as plt
 
-        figure = plt.figure("Human interaction", figsize=(7.0, 5.0))
+        figure = plt.figure("Human interaction", figsize=(9.0, 5.0), layout="constrained")
         while plt.fignum_exists(figure.number) and not rospy.is_shutdown() and not self._over.is_set():
             press = self._press
             recent = self._new_press()
@@ -184,22 +174,6 @@ class Watch:
 def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
     """Returns the value of the latest pair (stamp, value) with a stamp of at most `time_s` [s]; 0 if there is none."""
     return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
-
-
-def interrupt_roslaunch() -> bool:
-    """Interrupts the `roslaunch` that started this process, like Ctrl-C. The `roslaunch` then ends all of its nodes.
-
-    Returns:
-        Whether `roslaunch` started this process.
-    """
-    parent = os.getppid()
-    for uri in rospy.get_param("/roslaunch/uris", {}).values():
-        with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has ended
-            roslaunch: Any = xmlrpc.client.ServerProxy(uri)
-            if roslaunch.get_pid()[2] == parent:
-                os.kill(parent, signal.SIGINT)
-                return True
-    return False
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, position_in
 from custom_ros_tools.transforms import Array
+from rpbi_examples.waypoint_plot import draw_motion
 
 BASE, TIP, TARGET = "rpbi/kuka_lwr/lwr_arm_0_link", "rpbi/kuka_lwr/end_effector_ball", "interpol_target"
 HZ = 50.0
@@ -102,7 +103,7 @@ class RunInterpolation:
         self._path.publish(self._drawn)
 
     def _plot(self, times_s: list[float], positions: Array) -> None:
-        """Writes a picture with x, y and z of waypoints, target and tip to the file `~plot`, if the parameter is given.
+        """Writes a picture of waypoints, target and tip over time to the file `~plot`, if the parameter is given.
 
         Args:
             times_s: Times of the waypoints [s].
@@ -111,25 +112,15 @@ class RunInterpolation:
         name = rospy.get_param("~plot", "")
         if not name or not self._rows:
             return
-        import matplotlib  # importing it takes half a second, only needed for a picture
+        from matplotlib.figure import Figure  # importing it takes half a second, only needed for a picture
 
-        matplotlib.use("Agg")
-        from matplotlib import pyplot as plt
-
-        figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.6), constrained_layout=True)
-        seconds = [row[0] for row in self._rows]
-        for i, axis in enumerate(axes):
-            axis.plot(seconds, [row[1][i] for row in self._rows], color="#1f5fb4", label="plan")
-            axis.plot(seconds, [row[2][i] for row in self._rows], color="#e67814", linestyle="--", label="tip")
-            axis.plot(times_s, positions[i], "o", color="#222222", label="waypoints")
-            axis.set(title="xyz"[i], xlabel="time [s]", ylabel="position [m]")
-            axis.grid(alpha=0.3)
-        axes[0].legend()
+        figure = Figure(figsize=(9.0, 6.0), dpi=120, layout="constrained")
+        draw_motion(figure, self._rows, times_s, positions)
         path = Path(rospy.get_param("~working_directory", ".").strip(), name)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with atomic_file(path) as part:
-                figure.savefig(part, dpi=100)
+                figure.savefig(part)
         except (OSError, ValueError) as error:
             raise InterfaceError(f"plot: expected a picture file that can be written, got '{path}': {error}") from error
         rospy.loginfo("the motion is drawn in %s", path)

@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 
 from custom_ros_tools import schema
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.end_launch import end_launch
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.services import get_srv_handler
@@ -242,7 +243,7 @@ def _run() -> None:
         _report(seed, result, stage)
         if number == config.episodes:
             rospy.loginfo("%d of %d episodes succeeded", succeeded, number)
-            rospy.signal_shutdown("all episodes are done")
+            end_launch("all episodes are done")
             break
 
 

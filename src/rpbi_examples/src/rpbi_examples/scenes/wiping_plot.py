@@ -25,7 +25,7 @@ BLUE, INK, WIPED = "#1f5fb4", "#29479e", "#cfe8cf"
 
 def draw(scene: Wiping, result: SceneResult, title: str, file: Path) -> None:
     """Writes a picture of an episode that has ended: the force in the upper plot, the board in the lower plot."""
-    figure = Figure(figsize=(8.0, 7.5), layout="constrained")
+    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     force, board = figure.subplots(2, 1, height_ratios=(2, 3))
     figure.suptitle(f"{title}: {'succeeded' if result.success else f'failed {result.reason}'}")
     draw_force(scene, force, result.figures["way within 10 % [%]"])
@@ -42,13 +42,15 @@ def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
         share: Share of the path with the held force [%].
     """
     low, high = ((1.0 + side * TOLERANCE) * scene.force for side in (-1.0, 1.0))
-    axes.axhspan(low, high, color="0.92", label=f"within 10 %: {share:.1f} % of the way")
-    axes.axhline(scene.force, color="0.5", lw=1, ls="--", label=f"asked for: {scene.force:.1f} N")
+    axes.axhspan(low, high, color="0.92", label=f"within 10 %:\n{share:.1f} % of the path")
+    axes.axhline(scene.force, color="0.5", lw=1, ls="--", label=f"requested: {scene.force:.1f} N")
     if scene.stamps:
         axes.plot(ways_along(scene.stamps), scene.forces, color=BLUE, label=f"mean: {np.mean(scene.forces):.2f} N")
-    axes.set(xlabel="way on the board [m]", ylabel="normal force [N]", ylim=(0.8 * scene.force, 1.2 * scene.force))
+    axes.set(
+        xlabel="distance along the path [m]", ylabel="normal force [N]", ylim=(0.8 * scene.force, 1.2 * scene.force)
+    )
     axes.margins(x=0.01)
-    axes.legend(loc="upper right", fontsize="small", ncols=3)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
 
 
 def draw_board(scene: Wiping, axes: Axes, share: float) -> None:

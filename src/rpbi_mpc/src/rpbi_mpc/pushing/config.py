@@ -2,18 +2,87 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, PositiveMetres, Seconds, Unit
+from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, PositiveMetres, Seconds, Unit
 from rpbi_mpc.pushing.planar.model import SliderConfig
 
 from .outcome import ToleranceConfig
 from .planar.estimate import EstimatorConfig
 from .planar.motion import ApproachConfig
 from .planar.paths import PathConfig
-from .program import ProgramConfig
+
+
+class WeightsConfig(ConfigModel):
+    """Weights of the terms of the cost, which is a sum over the horizon. Most terms are squares.
+
+    Attributes:
+        position: Distance from the reference position [1/m^2].
+        yaw: Difference between yaw and the reference yaw, which is the direction of the path [1/rad^2].
+        contact: Distance of the pusher from the middle of the face [1/m^2].
+        force: Tangential force, and difference between the normal force and the force that moves the slider along the
+            path [s^2/m^2].
+        sliding: Speed of sliding along the face [s^2/m^2].
+        change: Difference between the force in the first step and the previous force [s^2/m^2].
+        final: Factor by which the weights of the last state are multiplied.
+        complementarity: Violation that the function `complementarity` returns: the contact slides although the force
+            is not at the edge of the friction cone [s^2/m^2].
+    """
+
+    position: NonNegative = Field(30000.0, description="Weight of the slider's distance from the path [1/m^2].")
+    yaw: NonNegative = Field(
+        10.0, description="Weight of the difference between the slider's yaw and the direction of the path [1/rad^2]."
+    )
+    contact: NonNegative = Field(
+        1.0, description="Weight of the pusher's distance from the middle of the face [1/m^2]."
+    )
+    force: NonNegative = Field(
+        10.0,
+        description="Weight of the tangential force, and of the difference between the normal force and the force "
+        "that moves the slider along the path [s^2/m^2].",
+    )
+    sliding: NonNegative = Field(10.0, description="Weight of the pusher's speed of sliding along the face [s^2/m^2].")
+    change: NonNegative = Field(
+        10.0,
+        description="Weight of the difference between the force in the first step and the previous force [s^2/m^2].",
+    )
+    final: NonNegative = Field(5.0, description="Factor of the weights for the last state.")
+    complementarity: Positive = Field(
+        1000.0,
+        description="Weight of forces and velocities with which the contact neither sticks nor slides [s^2/m^2].",
+    )
+
+
+class ProgramConfig(ConfigModel):
+    """Horizon, limits and solver.
+
+    Attributes:
+        steps: Number of steps of the horizon.
+        step_s: Duration of a step [s].
+        max_speed: Largest speed of the pusher normal to the face, and largest speed of sliding along the face [m/s].
+        weights: Weights of the cost.
+        solvers: Solvers, which are tried in this order until one converges. `fatrop` (L. Vanroye et al., IROS 2023) is
+            an interior-point method for optimal control. `ipopt` (A. Waechter and L. Biegler, Mathematical Programming
+            106, 2006) is several times slower but converges more often.
+        max_iterations: Number of iterations after which a solver gives up.
+        tolerance: Optimality error at which a solver stops.
+    """
+
+    steps: Annotated[int, Field(ge=2, le=200)] = Field(20, description="Number of steps of the horizon.")
+    step_s: Seconds = Field(0.08, description="Duration of a step.")
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(
+        0.15, description="Largest speed of the pusher normal to the face, and largest speed of sliding along the face."
+    )
+    weights: WeightsConfig = Field(WeightsConfig(), description="Weights of the cost.")
+    solvers: Annotated[ListOf[Literal["fatrop", "ipopt"]], Field(min_length=1)] = Field(
+        ("fatrop", "ipopt"), description="Solvers, tried in this order until one converges."
+    )
+    max_iterations: Annotated[int, Field(ge=1)] = Field(
+        40, description="Number of iterations after which a solver gives up."
+    )
+    tolerance: Positive = Field(1e-3, description="Optimality error below which a solver stops.")
 
 
 class PushingConfig(ConfigModel):

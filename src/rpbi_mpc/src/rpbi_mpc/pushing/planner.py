@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from .config import PushingConfig
 from .planar.model import pusher_velocity
 from .planar.motion import PlanarScene, rotation
 from .planar.paths import PushPath
-from .program import PushingProgram, Solved
+
+if TYPE_CHECKING:
+    from .program import Solved
 
 
 class PushSituation(NamedTuple):
@@ -79,9 +81,14 @@ class ProgramPlanner(PushPlanner):
 
     Args:
         config: Slider, pusher, path and cost.
+
+    Raises:
+        MissingDependency: If CasADi is not installed.
     """
 
     def __init__(self, config: PushingConfig) -> None:
+        from .program import PushingProgram  # here, since other planners need no CasADi
+
         self._config = config
         self._program = PushingProgram(config.slider, config.program)
         self.reset()

@@ -11,6 +11,7 @@ import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.end_launch import end_launch
 from rpbi_mpc.controller import MpcController, Plant
 from rpbi_mpc.loop import Cycle, LockStep, LoopConfig, Status
 from rpbi_mpc.msg import MpcStatus
@@ -88,7 +89,7 @@ class LoopNode:
                     if self._ends and cycle.status == Status.STOPPED:
                         raise InterfaceError(f"the task is not done: {cycle.reason}")
                     if self._ends:
-                        rospy.signal_shutdown("the task is done")
+                        end_launch("the task is done")
             elif self._loop.plant.is_timed:
                 self._loop.plant.stand()
                 self._loop.plant.advance(IDLE_S)

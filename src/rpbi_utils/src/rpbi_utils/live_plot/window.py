@@ -34,8 +34,8 @@ UNIT_WIDTH, GAP = 18, 12
 ROW = 17
 """Height of a row of the legend [px]."""
 MAX_LEGEND = 10
-"""Largest number of rows of the legend."""
-GRID, INK, FAULT, PAPER = QColor("#e0e0e0"), QColor("#303030"), QColor("#a02020"), QColor(255, 255, 255, 200)
+"""Largest number of rows of the legend. It takes no more than half of the room of its chart."""
+GRID, INK, FAULT = QColor("#e0e0e0"), QColor("#303030"), QColor("#a02020")
 
 
 class Chart(NamedTuple):
@@ -47,6 +47,7 @@ class Chart(NamedTuple):
         points: Horizontal positions [px] and values of each line.
         low: Lower end of the vertical axis, in `unit`.
         high: Upper end of the vertical axis, in `unit`.
+        legend: Texts and colours of the rows above the chart.
         top: Position of the upper edge [px].
         height: Height of the chart [px].
     """
@@ -56,6 +57,7 @@ class Chart(NamedTuple):
     points: list[tuple[np.ndarray, np.ndarray]]
     low: float
     high: float
+    legend: list[tuple[str, QColor]]
     top: float
     height: float
 
@@ -122,12 +124,12 @@ class Canvas(QWidget):
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._background(charts))
         for chart in charts:
+            self._draw_legend(painter, chart)
             painter.setClipRect(QRectF(LEFT, chart.top, self.width() - LEFT - RIGHT, chart.height))
             for line, (places, values) in zip(chart.lines, chart.points, strict=True):
                 painter.setPen(QPen(_colour(line), 1.0))
                 painter.drawPolyline(_polygon(LEFT + places, chart.y(values)))
-            self._draw_legend(painter, chart)
-        painter.setClipping(False)
+            painter.setClipping(False)
         painter.end()
 
     def _charts(self, end_s: float, lines: list[Line]) -> list[Chart]:
@@ -139,12 +141,14 @@ class Canvas(QWidget):
         of_unit = of_unit or {"": []}
         first = next(iter(of_unit))
         of_unit[first] = [line for line in lines if line.note] + of_unit[first]
-        height = (self.height() - TOP - BOTTOM - GAP * (len(of_unit) - 1)) / len(of_unit)
+        room = (self.height() - TOP - BOTTOM - GAP * (len(of_unit) - 1)) / len(of_unit)
         charts = []
         for number, (unit, own) in enumerate(of_unit.items()):
             points = [self._points(line, end_s, self.width() - LEFT - RIGHT) for line in own]
             low, high = _range([values for _, values in points])
-            charts.append(Chart(unit, own, points, low, high, TOP + number * (height + GAP), height))
+            legend = _legend(own, min(MAX_LEGEND, max(1, int(room / 2 / ROW))))
+            top = TOP + number * (room + GAP) + ROW * len(legend)
+            charts.append(Chart(unit, own, points, low, high, legend, top, max(1.0, room - ROW * len(legend))))
         return charts
 
     def _points(self, line: Line, end_s: float, width: int) -> tuple[np.ndarray, np.ndarray]:
@@ -157,7 +161,7 @@ class Canvas(QWidget):
 
     def _background(self, charts: list[Chart]) -> QPixmap:
         """Returns a picture of the axes, which is drawn again only when the axes change."""
-        axes = [(chart.unit, chart.low, chart.high) for chart in charts]
+        axes = [(chart.unit, chart.low, chart.high, chart.top) for chart in charts]
         wanted = (*axes, self.seconds, self.width(), self.height())
         if self._grid is None or wanted != self._grid_of:
             self._grid_of = wanted
@@ -202,16 +206,14 @@ class Canvas(QWidget):
             painter.drawText(QRectF(x - 40, bottom + 4, 80, 16), int(centre), f"{time_s:.{digits}f} s")
 
     def _draw_legend(self, painter: QPainter, chart: Chart) -> None:
-        most = min(MAX_LEGEND, max(1, int(chart.height / ROW) - 1))
-        rows = [_legend_row(line) for line in chart.lines[:most]]
-        if len(chart.lines) > most:
-            rows.append((f"and {len(chart.lines) - most} more", INK))
-        for number, (text, colour) in enumerate(rows):
-            room = QRectF(LEFT + 6, chart.top + 4 + ROW * number, self.width() - LEFT - RIGHT - 12, ROW)
-            alignment = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-            painter.fillRect(painter.boundingRect(room, alignment, text), PAPER)
+        for number, (text, colour) in enumerate(chart.legend):
+            top = chart.top - ROW * (len(chart.legend) - number)
             painter.setPen(colour)
-            painter.drawText(room, alignment, text)
+            painter.drawText(
+                QRectF(LEFT, top, self.width() - LEFT - RIGHT, ROW),
+                int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter),
+                text,
+            )
 
 
 class LivePlotWindow(QMainWindow):
@@ -277,9 +279,9 @@ class LivePlotWindow(QMainWindow):
 
     def _on_pause(self) -> None:
         self.canvas.pause()
-        self._pause.setText("Go on" if self.canvas.is_paused else "Pause")
+        self._pause.setText("Continue" if self.canvas.is_paused else "Pause")
         self._pause.setShortcut("Space")  # Qt removes the shortcut when the text changes
-        self._message.setText("paused" if self.canvas.is_paused else "goes on")
+        self._message.setText("paused" if self.canvas.is_paused else "continues")
 
     def _on_clear(self) -> None:
         self.canvas.clear()
@@ -319,6 +321,14 @@ def _named(widget: QWidget, name: str) -> QWidget:
 
 def _colour(line: Line) -> QColor:
     return FAULT if line.note else QColor(COLOURS[line.number % len(COLOURS)])
+
+
+def _legend(lines: list[Line], most: int) -> list[tuple[str, QColor]]:
+    """Returns at most `most` rows; the last one counts the lines that have none."""
+    if len(lines) <= most:
+        return [_legend_row(line) for line in lines]
+    rows = [_legend_row(line) for line in lines[: most - 1]]
+    return [*rows, (f"and {len(lines) - len(rows)} more" if rows else f"{len(lines)} lines", INK)]
 
 
 def _legend_row(line: Line) -> tuple[str, QColor]:

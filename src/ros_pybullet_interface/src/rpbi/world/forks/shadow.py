@@ -6,7 +6,6 @@ import gc
 import os
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -15,7 +14,7 @@ from multiprocessing.reduction import send_handle
 from pathlib import Path
 from typing import Any
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.child_process import python_module, start_child
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.state import WorldState
@@ -229,7 +228,7 @@ class Shadow:
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         process = start_child(
-            ["nice", "-n", str(niceness), sys.executable, "-P", "-m", "rpbi.follower", str(theirs.fileno())],
+            ["nice", "-n", str(niceness), *python_module("rpbi.follower", str(theirs.fileno()))],
             signal.SIGKILL,
             pass_fds=[theirs.fileno()],
             env=environment,

@@ -1,0 +1,83 @@
+"""Labels, legends and small images in pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from PIL import Image, ImageDraw
+from render import font
+from sensor_msgs.msg import Image as ImageMessage
+
+SIZE_PX, MARGIN_PX, BORDER_PX = 18, 6, 2
+INK, PAPER = "#222222", "#ffffff"
+
+
+def label(
+    picture: Image.Image, text: str, at: tuple[float, float], points_to: tuple[float, float] | None = None
+) -> None:
+    """Writes text on white, with its middle at a pixel, and draws a line to what it names.
+
+    Args:
+        picture: The picture, which is changed.
+        text: The text.
+        at: Column and row of the middle of the text [px].
+        points_to: Column and row of the line's end [px]; None draws no line.
+    """
+    draw = ImageDraw.Draw(picture)
+    if points_to is not None:
+        draw.line((*at, *points_to), INK, BORDER_PX)
+    box = draw.textbbox(at, text, font=font(SIZE_PX), anchor="mm")
+    left, top, right, bottom = (each + side * MARGIN_PX for each, side in zip(box, (-1, -1, 1, 1)))
+    draw.rounded_rectangle((left, top, right, bottom), MARGIN_PX, PAPER, "#bbbbbb")
+    draw.text(at, text, INK, font(SIZE_PX), anchor="mm")
+
+
+def legend(picture: Image.Image, lines: Sequence[tuple[str, str]], at: tuple[int, int]) -> None:
+    """Writes texts below each other on white, each after a sample of its colour.
+
+    Args:
+        picture: The picture, which is changed.
+        lines: Colours and texts.
+        at: Column and row of the upper left corner [px].
+    """
+    draw = ImageDraw.Draw(picture)
+    height, sample = SIZE_PX + MARGIN_PX, 2 * SIZE_PX
+    width = sample + 3 * MARGIN_PX + max(int(draw.textlength(text, font(SIZE_PX))) for _, text in lines)
+    left, top = at
+    draw.rounded_rectangle(
+        (left, top, left + width, top + height * len(lines) + 2 * MARGIN_PX), MARGIN_PX, PAPER, "#bbbbbb"
+    )
+    for row, (colour, text) in enumerate(lines):
+        middle = top + MARGIN_PX + height * row + height // 2
+        draw.line((left + MARGIN_PX, middle, left + MARGIN_PX + sample, middle), colour, 4)
+        draw.text((left + 2 * MARGIN_PX + sample, middle), text, INK, font(SIZE_PX), anchor="lm")
+
+
+def inset(picture: Image.Image, small: Image.Image, text: str, at: tuple[int, int]) -> None:
+    """Puts a small image with a border and a label into a picture.
+
+    Args:
+        picture: The picture, which is changed.
+        small: The image in the size that it shall have.
+        text: Its label.
+        at: Column and row of its upper left corner [px].
+    """
+    left, top = at
+    frame = (left - BORDER_PX, top - BORDER_PX, left + small.width + BORDER_PX - 1, top + small.height + BORDER_PX - 1)
+    ImageDraw.Draw(picture).rectangle(frame, PAPER)
+    picture.paste(small, at)
+    half = ImageDraw.Draw(picture).textlength(text, font(SIZE_PX)) / 2
+    label(picture, text, (left + half + 2 * MARGIN_PX, top + SIZE_PX))
+
+
+def colour_image(message: ImageMessage) -> Image.Image:
+    """Returns a camera's colour image, encoding `rgb8`."""
+    return Image.frombytes("RGB", (message.width, message.height), bytes(message.data))
+
+
+def depth_image(message: ImageMessage, near_m: float, far_m: float) -> Image.Image:
+    """Returns a camera's depth image, encoding `32FC1`, in grey: near is dark, far is bright."""
+    metres = np.frombuffer(message.data, np.float32).reshape(message.height, message.width)
+    grey = np.clip((metres - near_m) / (far_m - near_m), 0.0, 1.0) * 255.0
+    return Image.fromarray(grey.astype(np.uint8)).convert("RGB")

@@ -1,0 +1,287 @@
+"""Pictures of RViz with people: telepresence, teleoperation, a haptic device, the avatar, the guard, tracking."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import rospy
+import yaml
+from files import write_png
+from geometry_msgs.msg import WrenchStamped
+from labels import label
+from live import Array, Frames, Newest, Orbit, grab, place, xdotool
+from PIL import Image, ImageDraw
+from render import beside, with_caption
+from screen import Stage, call, wait_until
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool
+from visualization_msgs.msg import Marker, MarkerArray
+
+from rpbi_examples.dressing.outcome import rings_of
+from safe_robot.msg import Status
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "src/rpbi_examples"
+RVIZ = EXAMPLES / "rviz"
+GUARD = {
+    "base_frame": "rpbi/kuka_lwr/base",
+    "left_out": ["kuka_lwr"],
+    "period_s": 0.018,
+    "silence_s": 1.0,
+    "limits": {"acceleration": 10.0, "jerk": 1000.0},
+    "checks": {"environment": {"margin_m": 0.1, "timeout_s": 5.0}, "staleness": {"timeout_s": 5.0}},
+}
+"""Parameters of the guard; its times allow for a busy machine."""
+SHOWN_N, PRESSES_N = 0.05, 0.12
+"""Least force that RViz's text does not show as 0, and force of the sleeve at which the picture is taken [N]."""
+SPEED, PERIOD_S, FARTHEST_RAD = 0.05, 0.02, 0.5
+"""Speed of the joint that moves the arm down at the table [rad/s], time between two targets, and its longest motion."""
+ARRIVES_S = 1.0
+"""Time in which all messages of a stopped world arrive [s]."""
+RESTS_S = 3.0
+"""Time after which the arm rests on the box [s]."""
+TWIN = np.array((0.0, 1.2, -0.01))
+"""Place of the twin's world in that of the laboratory, for RViz [m]."""
+BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
+"""Frames of the ball that a person moves, and of the arm's tip, which follows it."""
+
+
+def telepresence(path: Path) -> None:
+    """Draws the sleeve on the forearm without force, and past the elbow while it presses on the arm."""
+    with Stage(600, 560) as stage:
+        stage.launch("telepresence.launch", "seed:=3")
+        frames, surface = Frames(), Newest("rpbi/sleeve/surface", Marker)
+        force, arrows = Newest("telepresence/force", Float64), Newest("rpbi/human/contacts/arrows", MarkerArray)
+        frames.wait_for("rpbi/human/RightHand")
+
+        def cuff() -> Array:
+            """Returns the middle of the cuff [m]."""
+            points = wait_until(lambda: surface.message, "there is a sleeve").points
+            return np.array(rings_of([(each.x, each.y, each.z) for each in points])[0].mean(axis=0))
+
+        def past_elbow() -> float:
+            """Returns the distance of the cuff past the elbow, along the upper arm [m]."""
+            elbow, shoulder = frames.wait_for("rpbi/human/RightForeArm"), frames.wait_for("rpbi/human/RightUpperArm")
+            return float((cuff() - elbow) @ (shoulder - elbow) / np.linalg.norm(shoulder - elbow))
+
+        def forces() -> list[Marker]:
+            return [each for each in arrows.message.markers if each.action == Marker.ADD] if arrows.message else []
+
+        view = Orbit(1.3, (0.4, -0.22, 1.3), 0.25, 0.85)
+        stage.rviz(RVIZ / "telepresence.rviz", **view.properties)
+        wait_until(lambda: force.message, "the robot moves")
+        stop_when(stage, lambda: past_elbow() > -0.15 and force.message.data < SHOWN_N and not forces())
+        before = stage.still_picture()
+        label(before, "sleeve", (80, 430), view.pixel(cuff(), before))
+        label(before, "elbow", (330, 300), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
+        call("rpbi/start")
+        stop_when(stage, lambda: past_elbow() > 0.0 and force.message.data > PRESSES_N and bool(forces()))
+        first = forces()[0].points[0]
+        after = stage.still_picture()
+        label(after, "forces", (80, 200), view.pixel((first.x, first.y, first.z), after))
+    write_png(path, beside(before, after))
+
+
+def teleop(path: Path) -> None:
+    """Draws arm, ball and keyboard window before keys are held, and while they are."""
+    with Stage(600, 500) as stage:
+        stage.launch("teleop.launch", "speed:=0.02")
+        frames = Frames()
+
+        def distance() -> float:
+            """Returns the distance of the arm's tip from the ball [m]."""
+            return float(np.linalg.norm(frames.wait_for(BALL) - frames.wait_for(TIP)))
+
+        wait_until(lambda: distance() < 0.003, "the arm is at the ball")
+        keyboard = place("^keyboard$")
+        view = Orbit(1.05, (0.15, 0.03, 0.38), 0.35, 4.9)
+        stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", {"TF": None, "Guard": None}, **view.properties)
+        rviz = place("RViz")
+        xdotool("windowfocus", "--sync", keyboard.number)
+        start, scene = frames.wait_for(BALL), stage.still_picture()
+        label(scene, "ball", (120.0, 420.0), view.pixel(start, scene))
+        before = panel(scene, grab(keyboard))
+        xdotool("windowraise", rviz.number)
+        xdotool("keydown", "Up", "keydown", "Right")
+        wait_until(lambda: np.linalg.norm(frames.wait_for(BALL) - start) > 0.13, "the ball moves")
+        scene, ball = stage.picture(), frames.wait_for(BALL)
+        xdotool("windowraise", keyboard.number)
+        window = grab(keyboard)
+    ImageDraw.Draw(scene).line((*view.pixel(start, scene), *view.pixel(ball, scene)), "#16a04a", 3)
+    label(scene, f"moved by {100 * np.linalg.norm(ball - start):.0f} cm", (130.0, 420.0), view.pixel(start, scene))
+    write_png(path, beside(before, panel(scene, window)))
+
+
+def human_interaction(path: Path) -> None:
+    """Draws the arm that presses on the box, and the window of the virtual device with its force."""
+    with Stage(760, 600) as stage, tempfile.TemporaryDirectory() as folder:
+        stage.launch("human_interaction.launch", "plot:=false", f"output:={folder}")
+        force = Newest("haptics/force", WrenchStamped)
+        handle = place("^Virtual haptic device$")
+        wait_until(lambda: force.message, "the device runs")
+        view = Orbit(0.9, (0.0, 0.0, 0.25), 0.25, 5.2)
+        stage.rviz(RVIZ / "human_interaction.rviz", {"TF": None, "Guard": None}, **view.properties)
+        rviz = place("RViz")
+        xdotool("windowraise", handle.number, "mousemove", (handle.left + handle.right) // 2, handle.upper + 210)
+
+        def presses() -> bool:
+            xdotool("click", "5")  # the wheel lowers the handle
+            time.sleep(0.2)
+            return bool(force.message.wrench.force.z > 3.5)
+
+        wait_until(presses, "the arm presses on the box")
+        time.sleep(RESTS_S)
+        window = grab(handle)
+        stage.stop_world()
+        xdotool("windowraise", rviz.number)
+        scene = stage.still_picture()
+    write_png(path, beside(scene, middle_of(window, scene.height)))
+
+
+def guard_rviz(path: Path) -> None:
+    """Draws the distances of an arm that was driven down at a table until the guard halted it."""
+    with Stage(900, 600) as stage, tempfile.TemporaryDirectory() as folder:
+        world = Path(folder) / "world.yaml"
+        world.write_text(yaml.safe_dump(table_world(Path(folder))), encoding="utf-8")
+        stage.launch("world.launch", f"config:={world}", "use_sim_time:=false")
+        frames, measured = Frames(), Newest("rpbi/kuka_lwr/joint_states", JointState)
+        wait_until(lambda: measured.message, "the arm is there")
+        rospy.set_param("robot_description", (EXAMPLES / "robots/kuka_lwr.urdf").read_text(encoding="utf-8"))
+        rospy.set_param("guard", GUARD)
+        states = "rpbi/kuka_lwr/joint_states"
+        remaps = f"joint_states/command:={states}/target", f"joint_states/measured:={states}"
+        stage.start(["rosrun", "safe_robot", "safe_robot_node.py", "__name:=guard", *remaps])
+        status, targets = Newest("robot_safety/status", Status), rospy.Publisher("joint_states/target", JointState)
+        view = Orbit(0.7, (0.0, 0.0, 0.2), 0.3, 4.9)
+        stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", {"TF": None}, **view.properties)
+        names, start = measured.message.name, np.array(measured.message.position)
+        downwards, moved = np.array([name == "lwr_arm_1_joint" for name in names]), 0.0
+
+        def send() -> bool:
+            """Sends a target, and returns whether the newest one was safe."""
+            message = JointState(name=names, position=(start + moved * downwards).tolist())
+            message.header.stamp = rospy.Time.now()
+            targets.publish(message)
+            time.sleep(PERIOD_S)
+            return status.message is not None and status.message.is_safe
+
+        wait_until(send, "the guard takes targets")
+        while send() and moved < FARTHEST_RAD:
+            moved += SPEED * PERIOD_S
+        scene, tip = stage.still_picture(), frames.wait_for(TIP)
+    label(scene, "the guard keeps the margin of 100 mm", (640, 480), view.pixel(tip - (0.0, 0.0, 0.08), scene))
+    write_png(path, scene)
+
+
+def table_world(folder: Path) -> dict[str, object]:
+    """Returns the main file of a world with an arm over a table; writes the table's file."""
+    size = {"shapeType": "GEOM_BOX", "halfExtents": [0.2, 0.14, 0.02]}
+    table = {
+        "name": "table",
+        "createVisualShape": {**size, "rgbaColor": [0.75, 0.62, 0.45, 1.0]},
+        "createCollisionShape": size,
+        "basePosition": [-0.05, 0.0, 0.02],
+    }
+    (folder / "table.yaml").write_text(yaml.safe_dump(table), encoding="utf-8")
+    return {
+        "setGravity": {"gravZ": -9.81},
+        "timeStep": 0.002,
+        "poses": [{"tf_id": "rpbi/floor"}],
+        "collision_objects": ["{rpbi_examples}/configs/floor.yaml", str(folder / "table.yaml")],
+        "robots": ["{rpbi_examples}/configs/basic_example_kuka_lwr/kuka_lwr.yaml"],
+    }
+
+
+def avatar_walking(path: Path) -> None:
+    """Draws the avatar in a stride, and while it reaches with either hand."""
+    with Stage(400, 520) as stage:
+        stage.launch("avatar.launch")
+        frames = Frames("rpbi/human/Pelvis")
+        frames.wait_for("rpbi/human/RightHand")
+        view = Orbit(2.6, (0.1, 0.0, -0.05), 0.2, -0.8)
+        stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
+
+        def part(name: str) -> Array:
+            return frames.wait_for(f"rpbi/human/{name}")
+
+        def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
+            stop_when(stage, condition)
+            picture = stage.still_picture()
+            call("rpbi/start")
+            return with_caption(picture, meaning)
+
+        pictures = (
+            moment(lambda: part("RightFoot")[0] - part("LeftFoot")[0] > 0.4, "a stride"),
+            moment(lambda: part("RightHand")[0] > 0.45, "the right hand reaches forward"),
+            moment(lambda: part("LeftHand")[0] > 0.45, "the left hand reaches forward"),
+        )
+    write_png(path, beside(*pictures))
+
+
+def tracking(path: Path) -> None:
+    """Draws both worlds while the box is seen, and while it is hidden and that of the twin has fallen."""
+    with Stage(620, 380) as stage:
+        stage.launch("tracking_example.launch")
+        frames = Frames("lab/rpbi/world")
+        boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
+        view = Orbit(1.45, (0.0, 0.6, 0.13), 0.4, 0.2)
+        stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
+
+        def apart() -> float:
+            """Returns the distance of the twin's box from where the laboratory's box is in its world [m]."""
+            return float(np.linalg.norm(frames.wait_for(boxes["twin"]) - frames.wait_for(boxes["lab"]) - TWIN))
+
+        def carry(is_on: bool) -> None:
+            """Moves the box of the laboratory, or holds it."""
+            rospy.ServiceProxy("lab/toggle_figure_eight", SetBool)(is_on)
+
+        def moment(condition: Callable[[], bool], meaning: str, caption: str, twin: str) -> Image.Image:
+            wait_until(condition, meaning)
+            carry(False)
+            for name in boxes:
+                stage.stop_world(name)
+            scene = stage.still_picture()
+            for text, name, (column, row) in (("laboratory", "lab", (-20, 110)), (twin, "twin", (-40, 120))):
+                at = view.pixel(frames.wait_for(boxes[name]), scene)
+                label(scene, text, (at[0] + column, min(at[1] + row, 350)), at)
+            for name in boxes:
+                call(f"{name}/rpbi/start")
+            carry(True)
+            return with_caption(scene, caption)
+
+        def is_on_floor() -> bool:
+            return bool(frames.wait_for(boxes["twin"])[2] < 0.05 + TWIN[2] + 0.005)
+
+        seen = moment(lambda: apart() < 0.02, "Vicon sees the box", "Vicon sees the box", "twin: at the same place")
+        hidden = moment(is_on_floor, "the box of the twin falls", "the box is hidden", "twin: it has fallen")
+    write_png(path, beside(seen, hidden))
+
+
+def stop_when(stage: Stage, condition: Callable[[], bool]) -> None:
+    """Stops the world at a tick for which a condition is true, also by the messages that are still on their path."""
+    while True:
+        wait_until(condition, "the moment of the picture")
+        stage.stop_world()
+        time.sleep(ARRIVES_S)
+        if condition():
+            return
+        call("rpbi/start")
+
+
+def panel(scene: Image.Image, window: Image.Image) -> Image.Image:
+    """Returns a scene with a window below, in its middle."""
+    whole = Image.new("RGB", (scene.width, scene.height + window.height + 8), "white")
+    whole.paste(scene)
+    whole.paste(window, ((scene.width - window.width) // 2, scene.height + 8))
+    return whole
+
+
+def middle_of(window: Image.Image, height: int) -> Image.Image:
+    """Returns a window in the middle of a white column of some height."""
+    column = Image.new("RGB", (window.width, height), "white")
+    column.paste(window, (0, (height - window.height) // 2))
+    return column

@@ -1,0 +1,171 @@
+"""Moving pictures of the scenes at work, and the sheet of all robots and scenes in docs/examples.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pybullet
+from files import write_gif, write_png
+from PIL import Image, ImageDraw
+from render import Photographer, font, with_caption
+from storyboard import grid
+
+from robot_model.geometry import Vector
+from rpbi.gym.env import WorldEnv
+from rpbi.world import World
+from rpbi_examples.scenes.scene import run_scene
+from rpbi_examples.scenes.task import EnvStage, make_env
+
+SEED = 3
+HZ, MAX_SCENE_BYTES = 10.0, 1_500_000
+"""Frames per second of the moving pictures, and their largest size."""
+SIZE_PX, SHEET_PX, COLUMNS = (560, 420), (320, 240), 4
+"""Sizes of the moving pictures and of those in the sheet, and columns of the sheet."""
+
+
+class View(NamedTuple):
+    """How a world is filmed.
+
+    Attributes:
+        position: Position of the camera in the world [m].
+        target: Point in the middle of the picture [m].
+        fov_deg: Vertical field of view [deg].
+        start_s: Time of the first frame [s].
+        end_s: Time after which no frame follows, if the scene has not ended before [s].
+        still_s: Time of the picture in the sheet [s].
+        speed: Simulated seconds per second of the moving picture.
+    """
+
+    position: Vector
+    target: Vector
+    fov_deg: float = 40.0
+    start_s: float = 0.0
+    end_s: float = 90.0
+    still_s: float = 0.1
+    speed: float = 1.0
+
+
+SCENES = {
+    "cup": View((1.6, 0.2, 1.75), (0.29, 0.2, 0.71), 34.0, 1.0, speed=3.0, still_s=6.0),
+    "wiping": View((0.8, 1.0, 0.95), (0.05, 0.0, 0.29), 38.0, 1.0, speed=2.5, still_s=8.0),
+    "handover": View((1.95, -1.9, 1.6), (0.6, -0.15, 1.17), 31.0, speed=4.0, still_s=9.0),
+    "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 1.0, 7.0, 3.96, 0.75),
+    "factory": View((1.2, 0.3, 1.7), (0.36, 0.02, 0.95), 39.0, 2.0, speed=4.0, still_s=12.0),
+    "dual_arm": View((2.2, 1.2, 1.5), (0.33, 0.05, 0.6), 32.0, speed=1.5, still_s=5.0),
+}
+"""Views of the scenes."""
+CLUTTER = View((0.60, -0.52, 1.00), (0.0, 0.0, 0.46), 46.0, end_s=2.0, still_s=3.0, speed=0.5)
+ROBOTS = {
+    "kuka_lwr": View((1.6, -1.5, 1.3), (0.35, 0.0, 0.4), 34.0),
+    "dual_iiwa": View((2.0, -1.2, 1.5), (0.2, 0.0, 0.7), 40.0),
+    "panda": View((1.3, -1.2, 1.0), (0.25, 0.0, 0.4), 34.0),
+    "kinova": View((1.1, -1.1, 0.9), (0.0, 0.0, 0.4), 34.0),
+    "talos": View((2.4, -1.6, 1.7), (0.0, 0.0, 0.95), 40.0),
+    "nextage": View((1.7, -1.1, 1.7), (0.0, 0.0, 1.0), 40.0),
+    "mobile_base": View((0.3, -1.9, 1.2), (-0.95, 0.0, 0.3), 38.0),
+    "human_model": View((2.6, -1.6, 1.6), (0.0, 0.0, 0.95), 38.0),
+}
+"""Views of the robots of the basic examples."""
+
+
+class FilmedStage(EnvStage):
+    """Runs a scene in an environment, and photographs its world at the given times [s]."""
+
+    def __init__(self, env: WorldEnv, camera: Photographer, times_s: Sequence[float]) -> None:
+        super().__init__(env)
+        self._filmed, self._camera, self._times_s = env, camera, times_s
+        self.pictures: list[Image.Image] = []
+
+    def cycle(self) -> None:
+        """Advances the world by a cycle, and photographs it if a picture is due."""
+        super().cycle()
+        done = len(self.pictures)
+        if done < len(self._times_s) and self._filmed.task.scene.seen.time_s >= self._times_s[done]:
+            self.pictures.append(self._camera.picture(self._filmed.world))
+
+
+def filmed(name: str, view: View, size: tuple[int, int], times_s: Sequence[float]) -> list[Image.Image]:
+    """Runs an episode of a scene, and returns pictures of its world at the given times [s]."""
+    env = make_env(name)
+    env.task.seed = SEED
+    env.reset(seed=SEED)
+    env.task.scene.longest_s = times_s[-1] + 0.1
+    stage = FilmedStage(env, Photographer(view.position, view.target, view.fov_deg, size), times_s)
+    run_scene(env.task.scene, stage)
+    env.close()
+    return stage.pictures
+
+
+def observed(name: str, view: View, size: tuple[int, int], times_s: Sequence[float]) -> list[Image.Image]:
+    """Runs the world of an example without commands, and returns pictures at the given times [s]."""
+    world = World.from_file(f"{{rpbi_examples}}/configs/{name}/config.yaml", connection_mode=pybullet.DIRECT)
+    camera, pictures = Photographer(view.position, view.target, view.fov_deg, size), []
+    for time_s in times_s:
+        while world.clock.tick * world.clock.dt_s < time_s:
+            world.step()
+        pictures.append(camera.picture(world))
+    world.close()
+    return pictures
+
+
+def movie(name: str, path: Path) -> None:
+    """Writes the moving picture of a scene, or of the world `clutter`."""
+    view, film = (CLUTTER, observed) if name == "clutter" else (SCENES[name], filmed)
+    times_s = np.arange(view.start_s, view.end_s, view.speed / HZ).tolist()
+    pictures = film(name, view, SIZE_PX, times_s)
+    speed = f"{view.speed:g} x speed"
+    for picture in pictures:
+        draw, corner = ImageDraw.Draw(picture), (SIZE_PX[0] - 10, SIZE_PX[1] - 10)
+        left, top, right, bottom = draw.textbbox(corner, speed, font(15), "rb")
+        draw.rectangle((left - 5, top - 3, right + 5, bottom + 3), "white")
+        draw.text(corner, speed, "#1f2937", font(15), "rb")
+    write_gif(path, pictures, HZ, most_bytes=MAX_SCENE_BYTES)
+
+
+def draw_cup(path: Path) -> None:
+    """Writes the moving picture of the scene `cup`."""
+    movie("cup", path)
+
+
+def draw_wiping(path: Path) -> None:
+    """Writes the moving picture of the scene `wiping`."""
+    movie("wiping", path)
+
+
+def draw_handover(path: Path) -> None:
+    """Writes the moving picture of the scene `handover`."""
+    movie("handover", path)
+
+
+def draw_talos(path: Path) -> None:
+    """Writes the moving picture of the scene `talos`."""
+    movie("talos", path)
+
+
+def draw_factory(path: Path) -> None:
+    """Writes the moving picture of the scene `factory`."""
+    movie("factory", path)
+
+
+def draw_dual_arm(path: Path) -> None:
+    """Writes the moving picture of the scene `dual_arm`."""
+    movie("dual_arm", path)
+
+
+def draw_clutter(path: Path) -> None:
+    """Writes the moving picture of the world `clutter`."""
+    movie("clutter", path)
+
+
+def draw_sheet(path: Path) -> None:
+    """Writes the sheet of the robots of the basic examples, and of the scenes at work."""
+    robots = {f"basic_example_{name}": (observed, view) for name, view in ROBOTS.items()}
+    scenes = {name: (filmed, view) for name, view in SCENES.items()} | {"clutter": (observed, CLUTTER)}
+    pictures = [
+        with_caption(film(name, view, SHEET_PX, [view.still_s])[0], name, 16)
+        for name, (film, view) in {**robots, **scenes}.items()
+    ]
+    write_png(path, grid(pictures, COLUMNS))

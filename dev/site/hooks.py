@@ -1,0 +1,105 @@
+"""Parts of the site that mkdocs.yml cannot describe: pages from this folder, files that pages link to, llms.txt."""
+
+from __future__ import annotations
+
+import logging
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from mkdocs.plugins import event_priority
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.nav import Navigation, Section
+from mkdocs.structure.pages import Page
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+LINK_OUT = re.compile(r"\]\(\.\./((?:src|tests|dev)/[^)\s#]+)\)")
+"""A link to a file of the repository outside docs."""
+FILE_AS_TEXT = re.compile(r"\[`?(\w+\.md)`?\]\(")
+"""A link whose text is the file name of a page."""
+MARK = re.compile(r"^ *<!-- .* -->\n(?= *```)", re.MULTILINE)
+"""A comment before a block, for the tests; MkDocs would end a list with it."""
+
+LOG = logging.getLogger("mkdocs.hooks.site")
+MIRROR = tempfile.TemporaryDirectory(prefix="site-api-")
+
+
+@event_priority(50)  # before mkdocstrings reads it
+def on_config(config: Any) -> Any:
+    """Lets mkdocstrings read the packages in a mirror in which each folder has an `__init__.py`, as it requires."""
+    mirror = Path(MIRROR.name)
+    for source in ROOT.glob("src/*/src"):
+        for path in source.rglob("*.py"):
+            link = mirror / path.relative_to(source)
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.exists() or link.symlink_to(path)
+    for folder in mirror.rglob("*/"):
+        (folder / "__init__.py").exists() or (folder / "__init__.py").touch()
+    config.plugins["mkdocstrings"].config.handlers["python"]["paths"] = [str(mirror)]
+    return config
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Adds the pages and the style of this folder, and the files outside docs that pages link to."""
+    pages = [file.abs_src_path for file in files.documentation_pages()]
+    linked = {path for page in pages if page for path in LINK_OUT.findall(Path(page).read_text(encoding="utf-8"))}
+    added = {f"api/{path.name}": path for path in sorted(HERE.glob("api/*.md"))}
+    added |= {"site.css": HERE / "site.css"} | {f"files/{path}": ROOT / path for path in sorted(linked)}
+    for uri, path in added.items():
+        files.append(File.generated(config, uri, abs_src_path=str(path)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
+    """Applies `extra.search`, replaces texts and targets of links, and removes the marks of blocks."""
+    search = config.extra["search"]
+    page.meta["search"] = {"boost": search["boost"].get(page.file.src_uri, 1)}
+    page.meta["tags"] = search["words"].get(page.file.src_uri, [])
+    named = FILE_AS_TEXT.sub(lambda match: f"[{heading(config, match[1])}](", MARK.sub("", markdown))
+    return LINK_OUT.sub(r"](files/\1)", named)
+
+
+def heading(config: Any, name: str) -> str:
+    """Returns the first heading of a page, or its file name if the page is not there."""
+    path = Path(config.docs_dir, name)
+    found = re.search(r"^# (.*)", path.read_text(encoding="utf-8"), re.MULTILINE) if path.exists() else None
+    return found[1] if found else name
+
+
+def on_env(env: Any, config: Any, files: Files) -> None:
+    """Refuses words and ranks for the search of pages that are not there."""
+    known = {file.src_uri for file in files.documentation_pages()}
+    for uri in sorted({uri for pages in config.extra["search"].values() for uri in pages} - known):
+        LOG.warning("mkdocs.yml: extra.search names %s, which is not there", uri)
+
+
+def on_nav(nav: Navigation, config: Any, files: Files) -> None:
+    """Keeps the navigation for llms.txt; titles and texts of its pages are not read yet."""
+    config.extra["nav"] = nav
+
+
+def on_post_build(config: Any) -> None:
+    """Writes llms.txt from the navigation, and the pages' Markdown, to which it leads."""
+    site = Path(config.site_dir)
+    lines = [f"# {config.site_name}", "", f"> {config.site_description}.", ""]
+    for section in config.extra["nav"].items:
+        lines += [f"## {section.title}", "", *map(entry, pages_of(section)), ""]
+        for page in pages_of(section):
+            (site / page.file.src_uri).write_text(page.markdown, encoding="utf-8")
+    (site / "llms.txt").write_text("\n".join(lines), encoding="utf-8")
+
+
+def pages_of(item: Any) -> list[Page]:
+    """Returns the pages of a part of the navigation, in their order."""
+    if isinstance(item, Section):
+        return [page for child in item.children for page in pages_of(child)]
+    return [item] if isinstance(item, Page) else []
+
+
+def entry(page: Page) -> str:
+    """Returns the line of a page in llms.txt: its title, its Markdown and its first paragraph."""
+    text = re.sub(r"```.*?```|<!--.*?-->|^[#|!].*?$", "", page.markdown, flags=re.DOTALL | re.MULTILINE).strip()
+    first = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", " ".join(text.partition("\n\n")[0].split()))
+    return f"- [{page.title}]({page.file.src_uri}): {first}"

@@ -1,0 +1,35 @@
+"""A required node that has done its work ends its launch without an error; one that fails is reported."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from ros_system import wait_until
+
+PUBLISHER = 'pkg="custom_ros_tools" type="resettable_static_transform_publisher"'
+LAUNCH = f"""<launch>
+  <node {PUBLISHER} name="other" args="0 0 0 0 0 0 1 map other"/>
+  <node {PUBLISHER} name="worker" required="true" output="screen" launch-prefix="{{python}} {{script}}"/>
+</launch>
+"""
+SCRIPT = """import signal, sys
+signal.pthread_sigmask(signal.SIG_BLOCK, {{signal.SIGINT}})
+from custom_ros_tools.ros.lifecycle.end_launch import end_launch
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+
+run_node("worker", object, lambda _: {end})
+"""
+
+
+@pytest.mark.parametrize(
+    ("end", "is_reported"), [("end_launch('done')", False), ("sys.exit(0)", True), ("sys.exit(1)", True)]
+)
+def test_only_success_ends_a_launch_without_an_error(ros, tmp_path, end, is_reported):
+    script, launch = tmp_path / "worker.py", tmp_path / "work.launch"
+    script.write_text(SCRIPT.format(end=end))
+    launch.write_text(LAUNCH.format(python=sys.executable, script=script))
+    roslaunch = ros.start(["roslaunch", str(launch)])
+    wait_until(lambda: roslaunch.poll() is not None, "all nodes have ended", 60.0)
+    assert ("REQUIRED process [worker-" in ros.output(roslaunch)) == is_reported
+    assert roslaunch.returncode == 0 and "Traceback" not in ros.output(roslaunch), ros.output(roslaunch)
