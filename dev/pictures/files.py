@@ -32,10 +32,10 @@ def common_palette(frames: Sequence[Image.Image], colours: int) -> Image.Image:
     return palette
 
 
-def write_png(path: Path, picture: Image.Image, colours: int = 256) -> None:
-    """Writes a picture with a palette; a photograph with gradients needs all 256 colours."""
-    palette = common_palette([picture], colours)
-    picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE).save(path, optimize=True)
+def write_png(path: Path, picture: Image.Image, colours: int = 256, dither: bool = False) -> None:
+    """Writes a picture with a palette; a photograph with gradients needs all 256 colours, and dithering."""
+    palette, kind = common_palette([picture], colours), Image.Dither.FLOYDSTEINBERG if dither else Image.Dither.NONE
+    picture.convert("RGB").quantize(palette=palette, dither=kind).save(path, optimize=True)
 
 
 def write_gif(

@@ -19,7 +19,7 @@ from nav_msgs.msg import Path as PathMessage
 from PIL import Image
 from render import Photographer, beside
 from rviz_view import rviz_camera
-from screen import Latest, Stage, next_message, wait_until
+from screen import Latest, Stage, call, next_message, wait_until
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from sensor_msgs.msg import Image as ImageMessage
 from std_msgs.msg import String
@@ -102,9 +102,10 @@ def clutter_rviz(path: Path) -> None:
     """Objects on a table as a point cloud and markers, and the images of the camera."""
     view = View((0.0, 0.0, 0.33), 1.08, 0.8, 5.9)
     with Stage(860, 640) as stage:
-        stage.launch("clutter.launch")
+        stage.launch("clutter.launch", "start:=false")
         stage.rviz(RVIZ / "clutter.rviz", {"TF": {"Marker Scale": 0.15}}, **view.of_rviz)
         colour, depth = Latest(COLOUR, ImageMessage), Latest(DEPTH, ImageMessage)
+        call("rpbi/start")
         next_message(COLOUR, ImageMessage, lambda each: each.header.stamp > FALLEN)
         stage.stop_world()
         picture = stage.still_picture()
@@ -113,7 +114,7 @@ def clutter_rviz(path: Path) -> None:
     inset(whole, colour_image(colour.message).resize((412, 316)), "colour image", (866, 2))
     inset(whole, depth_image(depth.message, 0.5, 1.5).resize((412, 316)), "depth image", (866, 322))
     label(whole, "RViz: point cloud, markers, frames", (168, 20))
-    write_png(path, whole)
+    write_png(path, whole, dither=True)
 
 
 def frustum(info: CameraInfo, depth_m: float) -> Marker:

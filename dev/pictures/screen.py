@@ -9,9 +9,10 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, TypeVar
+from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
@@ -32,12 +33,14 @@ SUPERSAMPLING = 2
 PATIENCE_S = 400.0
 """Longest wait for a window or a state [s]."""
 POLL_S = 0.1
+STARTS_S = 30.0
+"""Longest time in which a launch file sets its parameters [s]."""
 ATTEMPTS, OPENS_S = 3, 60.0
 """Number of starts of RViz, and longest time until it draws [s]."""
 STILL_S = 4.0
 """Time without a change after which a window counts as drawn [s]."""
 FRAMES, SETTLING_FRAMES = 3, 30
-"""Number of RViz's frames between two looks at the screen, and after its start, while it connects to all topics."""
+"""Number of RViz's frames between two looks at the screen, and after it has connected to all topics."""
 STOP_S = 30.0
 """Longest wait for the end of a program after SIGINT [s]."""
 COLOURS = 50
@@ -72,6 +75,16 @@ def next_message(topic: str, kind: type, condition: Callable[[Any], bool] = lamb
         raise TimeoutError(f"no such message on {topic} within {PATIENCE_S:g} s") from None
     finally:
         subscriber.unregister()
+
+
+def unconnected(node: str) -> set[str]:
+    """Returns the topics that a node subscribes and others publish, but to which it is not connected yet."""
+    master = rosgraph.Master("/pictures")
+    published, subscribed, _ = master.getSystemState()
+    wanted = {topic for topic, nodes in subscribed if node in nodes}
+    offered = {topic for topic, nodes in published if set(nodes) - {node}}
+    connections = ServerProxy(master.lookupNode(node)).getBusInfo("/pictures")[2]
+    return (wanted & offered) - {topic for _, _, direction, _, topic, *_ in connections if direction == "i"}
 
 
 class Latest:
@@ -147,8 +160,15 @@ class Stage:
         return process
 
     def launch(self, name: str, *arguments: str, package: str = "rpbi_examples") -> subprocess.Popen[bytes]:
-        """Starts a launch file without RViz; see `rviz`."""
-        return self.start(["roslaunch", package, name, "rviz:=false", *arguments])
+        """Starts a launch file without RViz; see `rviz`.
+
+        RViz would show frames by wall time, and hide those of a stopped world, if it started before the launch file has
+        set `/use_sim_time`. A launch file without a world does not set it.
+        """
+        process = self.start(["roslaunch", package, name, "rviz:=false", *arguments])
+        with suppress(TimeoutError):
+            wait_until(lambda: rospy.has_param("/use_sim_time"), "ROS has simulated time or not", STARTS_S)
+        return process
 
     def rviz(self, config: Path, displays: Mapping[str, Mapping[str, Any] | None] | None = None, **view: Any) -> None:
         """Opens RViz over the whole screen with only its 3-D view, and waits until it draws.
@@ -183,6 +203,7 @@ class Stage:
                 if attempt == ATTEMPTS:
                     raise
                 _stop(process)
+        wait_until(lambda: not unconnected("/rviz"), "RViz is connected to all topics that it shows")
         self._let_rviz_work(SETTLING_FRAMES)
 
     def stop_world(self, namespace: str = "") -> None:
