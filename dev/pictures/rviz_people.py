@@ -29,15 +29,15 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "src/rpbi_examples"
 RVIZ = EXAMPLES / "rviz"
 GUARD = {
     "base_frame": "rpbi/kuka_lwr/base",
-    "left_out": ["kuka_lwr"],
+    "left_out": ["kuka_lwr", "floor"],
     "period_s": 0.018,
     "silence_s": 1.0,
     "limits": {"acceleration": 10.0, "jerk": 1000.0},
     "checks": {"environment": {"margin_m": 0.1, "timeout_s": 5.0}, "staleness": {"timeout_s": 5.0}},
 }
 """Parameters of the guard; its times allow for a busy machine."""
-SHOWN_N, PRESSES_N = 0.05, 0.12
-"""Least force that RViz's text does not show as 0, and force of the sleeve at which the picture is taken [N]."""
+SHOWN_N = 0.05
+"""Least force that the text in RViz does not round to 0 [N]."""
 SPEED, PERIOD_S, FARTHEST_RAD = 0.05, 0.02, 0.5
 """Speed of the joint that moves the arm down at the table [rad/s], time between two targets, and its longest motion."""
 ARRIVES_S = 1.0
@@ -51,35 +51,38 @@ BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 
 
 def telepresence(path: Path) -> None:
-    """Draws the sleeve on the forearm without force, and past the elbow while it presses on the arm."""
+    """Draws the sleeve on the forearm and past the elbow, while it presses on the arm."""
     with Stage(600, 560) as stage:
         stage.launch("telepresence.launch", "seed:=3")
         frames, surface = Frames(), Newest("rpbi/sleeve/surface", Marker)
         force, arrows = Newest("telepresence/force", Float64), Newest("rpbi/human/contacts/arrows", MarkerArray)
         frames.wait_for("rpbi/human/RightHand")
 
-        def cuff() -> Array:
-            """Returns the middle of the cuff [m]."""
+        def ring(number: int) -> Array:
+            """Returns the middle of a ring of the sleeve, counted from the cuff [m]."""
             points = wait_until(lambda: surface.message, "there is a sleeve").points
-            return np.array(rings_of([(each.x, each.y, each.z) for each in points])[0].mean(axis=0))
+            return np.array(rings_of([(each.x, each.y, each.z) for each in points])[number].mean(axis=0))
 
         def past_elbow() -> float:
             """Returns the distance of the cuff past the elbow, along the upper arm [m]."""
             elbow, shoulder = frames.wait_for("rpbi/human/RightForeArm"), frames.wait_for("rpbi/human/RightUpperArm")
-            return float((cuff() - elbow) @ (shoulder - elbow) / np.linalg.norm(shoulder - elbow))
+            return float((ring(0) - elbow) @ (shoulder - elbow) / np.linalg.norm(shoulder - elbow))
 
         def forces() -> list[Marker]:
             return [each for each in arrows.message.markers if each.action == Marker.ADD] if arrows.message else []
 
+        def presses() -> bool:
+            return bool(force.message.data > SHOWN_N and forces())
+
         view = Orbit(1.3, (0.4, -0.22, 1.3), 0.25, 0.85)
         stage.rviz(RVIZ / "telepresence.rviz", **view.properties)
         wait_until(lambda: force.message, "the robot moves")
-        stop_when(stage, lambda: past_elbow() > -0.15 and force.message.data < SHOWN_N and not forces())
+        stop_when(stage, lambda: -0.25 < past_elbow() < -0.08 and presses())
         before = stage.still_picture()
-        label(before, "sleeve", (80, 430), view.pixel(cuff(), before))
-        label(before, "elbow", (330, 300), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
+        label(before, "sleeve", (260, 400), view.pixel(ring(7), before))
+        label(before, "elbow", (380, 300), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
         call("rpbi/start")
-        stop_when(stage, lambda: past_elbow() > 0.0 and force.message.data > PRESSES_N and bool(forces()))
+        stop_when(stage, lambda: past_elbow() > 0.0 and presses())
         first = forces()[0].points[0]
         after = stage.still_picture()
         label(after, "forces", (80, 200), view.pixel((first.x, first.y, first.z), after))
@@ -172,6 +175,7 @@ def guard_rviz(path: Path) -> None:
         wait_until(send, "the guard takes targets")
         while send() and moved < FARTHEST_RAD:
             moved += SPEED * PERIOD_S
+        stage.stop_world()
         scene, tip = stage.still_picture(), frames.wait_for(TIP)
     label(scene, "the guard keeps the margin of 100 mm", (640, 480), view.pixel(tip - (0.0, 0.0, 0.08), scene))
     write_png(path, scene)
@@ -179,12 +183,12 @@ def guard_rviz(path: Path) -> None:
 
 def table_world(folder: Path) -> dict[str, object]:
     """Returns the main file of a world with an arm over a table; writes the table's file."""
-    size = {"shapeType": "GEOM_BOX", "halfExtents": [0.2, 0.14, 0.02]}
+    size = {"shapeType": "GEOM_BOX", "halfExtents": [0.2, 0.14, 0.01]}
     table = {
         "name": "table",
         "createVisualShape": {**size, "rgbaColor": [0.75, 0.62, 0.45, 1.0]},
         "createCollisionShape": size,
-        "basePosition": [-0.05, 0.0, 0.02],
+        "basePosition": [-0.05, 0.0, 0.01],
     }
     (folder / "table.yaml").write_text(yaml.safe_dump(table), encoding="utf-8")
     return {
@@ -200,16 +204,21 @@ def avatar_walking(path: Path) -> None:
     """Draws the avatar in a stride, and while it reaches with either hand."""
     with Stage(400, 520) as stage:
         stage.launch("avatar.launch")
-        frames = Frames("rpbi/human/Pelvis")
+        frames, room = Frames("rpbi/human/Pelvis"), Frames()
         frames.wait_for("rpbi/human/RightHand")
-        view = Orbit(2.6, (0.1, 0.0, -0.05), 0.2, -0.8)
+        view = Orbit(2.9, (0.1, 0.0, -0.05), 0.2, -0.8)
         stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
 
         def part(name: str) -> Array:
             return frames.wait_for(f"rpbi/human/{name}")
 
+        def is_seen_from_its_side() -> bool:
+            left = room.wait_for("rpbi/human/LeftUpperArm") - room.wait_for("rpbi/human/RightUpperArm")
+            towards = np.array((np.cos(view.yaw_rad), np.sin(view.yaw_rad), 0.0))
+            return bool(abs(left @ towards) > 0.75 * np.linalg.norm(left))
+
         def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
-            stop_when(stage, condition)
+            stop_when(stage, lambda: condition() and is_seen_from_its_side())
             picture = stage.still_picture()
             call("rpbi/start")
             return with_caption(picture, meaning)
