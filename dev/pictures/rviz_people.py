@@ -204,7 +204,7 @@ def avatar_walking(path: Path) -> None:
     """Draws the avatar in a stride, and while it reaches with either hand."""
     with Stage(400, 520) as stage:
         stage.launch("avatar.launch")
-        frames, room = Frames("rpbi/human/Pelvis"), Frames()
+        frames = Frames("rpbi/human/Pelvis")
         frames.wait_for("rpbi/human/RightHand")
         view = Orbit(2.9, (0.1, 0.0, -0.05), 0.2, -0.8)
         stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
@@ -212,13 +212,8 @@ def avatar_walking(path: Path) -> None:
         def part(name: str) -> Array:
             return frames.wait_for(f"rpbi/human/{name}")
 
-        def is_seen_from_its_side() -> bool:
-            left = room.wait_for("rpbi/human/LeftUpperArm") - room.wait_for("rpbi/human/RightUpperArm")
-            towards = np.array((np.cos(view.yaw_rad), np.sin(view.yaw_rad), 0.0))
-            return bool(abs(left @ towards) > 0.75 * np.linalg.norm(left))
-
         def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
-            stop_when(stage, lambda: condition() and is_seen_from_its_side())
+            stop_when(stage, condition)
             picture = stage.still_picture()
             call("rpbi/start")
             return with_caption(picture, meaning)
