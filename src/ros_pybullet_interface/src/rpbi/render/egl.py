@@ -17,6 +17,8 @@ import numpy.typing as npt
 log = logging.getLogger(__name__)
 
 DEPTH_BITS = 24
+WINDOW_PX = (1024, 768)
+"""Columns and rows of the plugin's hidden window, the largest image that PyBullet draws [px]."""
 
 # From the Khronos headers egl.h and gl.h.
 _CONFIG_ID, _NONE = 0x3028, 0x3038
@@ -24,7 +26,7 @@ _BLUE, _GREEN, _RED, _DEPTH = 0x3022, 0x3023, 0x3024, 0x3025
 _SURFACE_TYPE, _PBUFFER_BIT = 0x3033, 0x0001
 _RENDERABLE_TYPE, _OPENGL_BIT = 0x3040, 0x0008
 _HEIGHT, _WIDTH, _DRAW = 0x3056, 0x3057, 0x3059
-_GL_RENDERER, _GL_DEPTH_COMPONENT, _GL_FLOAT, _GL_VIEWPORT = 0x1F01, 0x1902, 0x1406, 0x0BA2
+_GL_RENDERER, _GL_DEPTH_COMPONENT, _GL_FLOAT = 0x1F01, 0x1902, 0x1406
 
 
 class EglError(RuntimeError):
@@ -57,12 +59,10 @@ class Egl:
     def read_depth(self, width_px: int, height_px: int) -> npt.NDArray[np.float32]:
         """Returns the depth buffer after the last drawing pass, shape (height, width), with the top row first.
 
-        PyBullet draws at most 1024 x 768 pixels, the size of its hidden window, and repeats pixels for larger images.
-        This method repeats depths in the same way.
+        PyBullet draws at most `WINDOW_PX`, and repeats pixels for larger images. This method repeats depths in the same
+        way.
         """
-        viewport = np.empty(4, np.int32)
-        self._gl("glGetIntegerv", None, c_uint, c_void_p)(_GL_VIEWPORT, viewport.ctypes.data)
-        _, _, columns, rows = viewport.tolist()
+        columns, rows = min(width_px, WINDOW_PX[0]), min(height_px, WINDOW_PX[1])
         depth = np.empty((rows, columns), np.float32)
         read = self._gl("glReadPixels", None, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
         read(0, 0, columns, rows, _GL_DEPTH_COMPONENT, _GL_FLOAT, depth.ctypes.data)
