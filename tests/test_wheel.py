@@ -120,6 +120,7 @@ def test_wheel_has_the_world_of_the_page_and_its_robot(selection, modules):
 
 def too_new(paths: list[str]) -> str:
     """Returns the lines of files that need a later Python than the oldest of the wheel."""
+    pytest.importorskip("vermin", reason="the extra `wheel` is not installed")
     oldest = re.match(r">=([\d.]+)", PROJECT["requires-python"])[1]
     options = (f"--target={oldest}-", "--violations", "--eval-annotations", "--backport", "typing_extensions")
     done = subprocess.run(
