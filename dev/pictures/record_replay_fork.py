@@ -148,7 +148,7 @@ def misfit(box: Pose) -> tuple[float, float]:
 
 def misfit_text(box: Pose) -> str:
     """Returns the misfit of the box as text."""
-    return "{:.0f} mm and {:.0f}° off".format(*misfit(box))
+    return "{:.0f} mm and {:.0f}° from the mark".format(*misfit(box))
 
 
 def outlined(picture: Image.Image, box: Pose) -> Image.Image:

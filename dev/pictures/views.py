@@ -37,7 +37,7 @@ REAL_DISPLAYS = {
     "Guard of the real robot": None,
     "World": {"Namespaces": {"kuka_lwr": False, "floor": False}},
 }
-BASES = {"simulated arm: the target": (0.4, 0.0, -0.14), "real robot, as measured": (0.4, 0.9, -0.1)}
+BASES = {"simulated arm: the target": (0.4, 0.0, -0.14), "stand-in for the real robot": (0.4, 0.9, -0.1)}
 """Points below the bases of both arms, in the world [m]."""
 JOINT, GOAL_RAD, MOVE_S, MOVES = "lwr_arm_0_joint", 0.8, 2.0, 4
 """The move of the simulated arm that the real one follows, and how often."""
@@ -123,7 +123,7 @@ def _lag_s(states: States) -> float:
 
 def _draw_lag(axes: Any, states: States) -> None:
     axes.plot(*np.transpose(states[TARGETS]), color="#e8731a", label="simulated arm: the target")
-    axes.plot(*np.transpose(states[MEASURED]), color="#22333f", label="real robot, as measured")
+    axes.plot(*np.transpose(states[MEASURED]), color="#22333f", label="stand-in, as measured")
     half, (target_s, measured_s) = GOAL_RAD / 2.0, _half_times_s(states)
     axes.annotate("", (measured_s, half), (target_s, half), arrowprops={"arrowstyle": "<->"})
     axes.annotate(f"{_lag_s(states):.2f} s later", (measured_s, half), (8, -3), textcoords="offset points")
