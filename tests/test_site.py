@@ -151,6 +151,12 @@ def test_search_finds_the_answer(search, question):
     assert set(QUESTIONS[question]) & set(first), first
 
 
+def test_search_needs_no_server(site):
+    """Tried by hand in Chromium; browsers start no worker from a file."""
+    assert (site / "search/search_index.js").read_text(encoding="utf-8").startswith("var __index = {")
+    assert '<script src="iframe-worker.js">' in (site / "index.html").read_text(encoding="utf-8")
+
+
 def test_search_for_a_word_of_no_page_finds_nothing(search):
     assert search.pages("xylophone") == []
 

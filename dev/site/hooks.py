@@ -46,7 +46,8 @@ def on_files(files: Files, config: Any) -> Files:
     pages = [file.abs_src_path for file in files.documentation_pages()]
     linked = {path for page in pages if page for path in LINK_OUT.findall(Path(page).read_text(encoding="utf-8"))}
     added = {f"api/{path.name}": path for path in sorted(HERE.glob("api/*.md"))}
-    added |= {"site.css": HERE / "site.css"} | {f"files/{path}": ROOT / path for path in sorted(linked)}
+    added |= {name: HERE / name for name in ("site.css", "iframe-worker.js")}
+    added |= {f"files/{path}": ROOT / path for path in sorted(linked)}
     for uri, path in added.items():
         files.append(File.generated(config, uri, abs_src_path=str(path)))
     return files
