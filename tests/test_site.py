@@ -51,7 +51,7 @@ QUESTIONS = {
     "inverse kinematics": ("ik",),
     "install": ("installation",),
 }
-"""What people ask of simulators, and the pages of which one answers."""
+"""Questions about simulators; for each, pages of which one has the answer."""
 
 
 def build(config: Path, site: Path) -> subprocess.CompletedProcess[str]:

@@ -78,8 +78,8 @@ def test_missing_extra_is_named_as_pip_takes_it(monkeypatch):
 def test_other_versions_of_python_are_refused(python, is_refused):
     script = f"import sys; sys.version_info = {python}; import rpbi"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300.0)
-    told = f"rpbi needs CPython 3.10 or 3.11 on Linux, and this is Python {python[0]}.{python[1]} on linux"
-    assert (told in done.stderr) == is_refused, done.stderr
+    message = f"rpbi needs CPython 3.10 or 3.11 on Linux, and this is Python {python[0]}.{python[1]} on linux"
+    assert (message in done.stderr) == is_refused, done.stderr
 
 
 @pytest.fixture(scope="module")

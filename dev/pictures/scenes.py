@@ -27,7 +27,7 @@ SIZE_PX, SHEET_PX, COLUMNS = (560, 420), (320, 240), 4
 
 
 class View(NamedTuple):
-    """How a world is filmed.
+    """Camera, speed and duration of a moving picture.
 
     Attributes:
         position: Position of the camera in the world [m].

@@ -34,7 +34,7 @@ SHORTER = {
     r"--states \d+": "--states 5",
     r"--climbs \d+": "--climbs 1",
 }
-"""What replaces the options of a command that takes minutes, by pattern."""
+"""Smaller options for commands that take minutes, indexed by pattern."""
 STARTED_ELSEWHERE = (ROOT / "tests/ros/rpbi_examples/test_launch_starts.py").read_text()
 TICKS = 20
 SLOW_S = 120.0

@@ -14,7 +14,7 @@ self.console = {warn: (text) => { throw new Error(text); }};
 self.addEventListener = (kind, handler) => { ask = (type, data) => { handler({data: {type, data}}); }; };
 self.postMessage = (message) => answers.push(message.data);
 """
-"""What the worker uses of a browser."""
+"""The functions of a browser that the worker calls."""
 
 
 class SiteSearch:

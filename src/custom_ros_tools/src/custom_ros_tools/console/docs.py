@@ -89,8 +89,8 @@ def docs(
     read. Dead links, missing headings and pages without a place in the navigation make the build fail.
 
     Args:
-        serve: shows the site at http://localhost:8000 until Ctrl-C, and again after each change of a page
-        port: another port for --serve
+        serve: show the site at http://localhost:8000 until Ctrl-C, and again after each change of a page
+        port: port for --serve; 8000 by default
     """
     root = workspace()
     for path, text in files(root).items():

@@ -57,7 +57,7 @@ class GuardNode:
         self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
         self._sent_s = self._repeated_s = NEVER_S
-        self._last_stamp: tuple[rospy.Time, float, float] | None = None
+        self._last_stamp: tuple[rospy.Time, float, float] | None = None  # stamp, arrival [s], lateness at arrival [s]
         self._target_topic = rospy.resolve_name("joint_states/target")
         self._command = rospy.Publisher(
             "joint_states/command",
