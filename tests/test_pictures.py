@@ -17,7 +17,6 @@ NO_SCRIPT = frozenset(
     {
         "gym_curve.png",
         "ik_errors.png",
-        "ik_talos.png",
         "lfd_pipeline.png",
         "mvn.png",
         "streams.png",

@@ -47,6 +47,7 @@ PICTURES: dict[str, str] = {
     "wiping.png": "wiping:draw_wiping",
     "clutter_rviz.png": "rviz_worlds:clutter_rviz",
     "rgbd_cloud.png": "rviz_worlds:rgbd_cloud",
+    "ik_talos.png": "ik_tasks:draw_ik_talos",
     "ik_drag.png": "rviz_worlds:ik_drag",
     "dual_iiwa.png": "rviz_worlds:dual_iiwa",
     "lfd_rviz.png": "rviz_worlds:lfd_rviz",

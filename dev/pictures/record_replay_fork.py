@@ -35,7 +35,7 @@ PAUSE = 14
 HEIGHT = 420
 """Height of the pictures [px]."""
 CAMERA = Photographer((-0.95, -1.15, 0.95), (0.02, 0.0, 0.25), 34.0, (WIDTH, HEIGHT))
-FORK_CAMERA = Photographer((-0.75, -1.0, 0.9), (-0.06, 0.02, 0.12), 30.0, ((WIDTH - GAP) // 2, (HEIGHT - GAP) // 2))
+FORK_CAMERA = Photographer((-0.85, -1.1, 0.95), (-0.03, 0.01, 0.2), 34.0, ((WIDTH - GAP) // 2, (HEIGHT - GAP) // 2))
 BOX_HALF_M = (*HALF_SIDES_M, 0.06)
 OFFSETS_M = (-0.06, -0.02, 0.02, 0.06)
 """Distances of the forks' pushes from the middle of the box's side [m]."""
