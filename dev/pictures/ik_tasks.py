@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-import numpy as np
 from plots import GOOD, empty_figure, legend_below, save, show
 from render import Photographer
 
