@@ -46,6 +46,7 @@ def test_verify_ends_an_episode_with_slow_ticks(slow, run) -> None:
     assert code == 1 and text == f"episode 0: {TOO_SLOW}\n0 of 1 episodes are the same\n"
 
 
+@pytest.mark.thorough
 def test_view_ends_a_page_that_takes_long(slow, run, monkeypatch, tmp_path: Path) -> None:
     def spin(*_, **__):
         while True:
