@@ -50,6 +50,12 @@ QUESTIONS = {
     "MoveIt": ("trajectories",),
     "inverse kinematics": ("ik",),
     "install": ("installation",),
+    "robot does not move": ("questions", "robots"),
+    "joint limits": ("robots",),
+    "reset": ("time",),
+    "color image": ("cameras",),
+    "suction": ("hands",),
+    "friction": ("dynamics", "contacts", "physics"),
 }
 """Questions about simulators; for each, pages of which one has the answer."""
 
