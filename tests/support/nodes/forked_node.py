@@ -34,6 +34,7 @@ PACKAGES = {
     "rpbi_mpc",
     "ros_pybullet_interface",
     "rpbi_examples",
+    "rpbi_ros2",
     "rpbi_utils",
     "episodes",
     "safe_robot",

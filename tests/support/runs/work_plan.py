@@ -65,6 +65,7 @@ EXTRA_OF = {
     "av": "data",
     "pyarrow": "data",
     "rosbags": "data",
+    "cyclonedds": "ros2",
     "ray": "farm",
     "mkdocs": "site",
     "py_mini_racer": "site",

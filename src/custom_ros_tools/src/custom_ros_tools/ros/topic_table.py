@@ -1,4 +1,4 @@
-"""The table of a ROS system's topics, from which browser view, Foxglove bridge and ROS 2 bridge know what is there.
+"""The table of a ROS system's topics, for the browser view, the Foxglove bridge and the ROS 2 bridge.
 
 The table asks the ROS master once a second and subscribes to nothing. It therefore has the topics of every node.
 """
@@ -51,11 +51,13 @@ class SystemState:
         publishers: Names of publishing nodes, indexed by topic.
         subscribers: Names of subscribing nodes, indexed by topic.
         providers: Names of serving nodes, indexed by service.
+        types: Message types, indexed by topic; also of topics that nobody publishes.
     """
 
     publishers: Mapping[str, frozenset[str]]
     subscribers: Mapping[str, frozenset[str]]
     providers: Mapping[str, frozenset[str]]
+    types: Mapping[str, str]
 
 
 class TopicTable:
@@ -72,7 +74,7 @@ class TopicTable:
         self._on_change = on_change
         self._lock = threading.RLock()
         self._rows: dict[str, TopicRow] = {}
-        self._state = SystemState({}, {}, {})
+        self._state = SystemState({}, {}, {}, {})
         self._timer: WallTimer | None = None
 
     @property
@@ -108,7 +110,8 @@ class TopicTable:
         except MASTER_FAILURES:
             return
         types = dict(pairs)
-        state = SystemState(*map(_by_name, lists))
+        publishers_of, subscribers_of, providers_of = map(_by_name, lists)
+        state = SystemState(publishers_of, subscribers_of, providers_of, types)
         with self._lock:
             self._state = state
             for name in self._rows.keys() - state.publishers.keys():
