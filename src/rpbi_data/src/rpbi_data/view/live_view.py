@@ -1,0 +1,167 @@
+"""The view of a running world in browsers: draws the world at a fixed rate, and keeps its last seconds."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
+
+from .controls import Controls
+from .first_view import FOV_RAD, first_view
+from .live_scene import LiveScene
+from .moment import History, Moment, Name, ShapeItem, moment_at
+from .panel import ViewPanel
+from .scene import Array, Poses, ShownLink
+from .web_server import WebServer
+
+FRAMES_HZ, REFRESH_HZ, IMAGES_HZ = 30.0, 4.0, 10.0
+"""Rates of poses, of the fields of the panel, and of images, in wall time [Hz]."""
+IDLE_HZ = 2.0
+"""Rate at which the scene is drawn while nobody looks, so that the next viewer sees it at once [Hz]."""
+
+_log = logging.getLogger(__name__)
+
+
+class ViewSource(Protocol):
+    """Content of a live view."""
+
+    def moment(self) -> Moment:
+        """Returns frames and items as they are now. A returned moment must never change."""
+
+    @property
+    def images(self) -> Sequence[str]:
+        """Names of the images that can be chosen."""
+
+    def choose_image(self, name: str) -> None:
+        """Chooses one of `images`; an empty text chooses none."""
+
+    def picture(self) -> tuple[float, Array | None, Name | None]:
+        """Returns time [s] and pixels of the newest chosen image, and the name of its camera's item."""
+
+
+class LiveView:
+    """Shows a world in browsers, until it is closed.
+
+    A thread draws the present moment, or a moment of the past if a viewer has moved the time line. Nothing that a
+    viewer does can stop the thread: viser sends in another thread, and drops what a slow viewer has not received.
+
+    Args:
+        source: Content of the view.
+        controls: Controls of the world.
+        server: The web server, which `close` ends.
+        world: Name of the world frame.
+    """
+
+    def __init__(self, source: ViewSource, controls: Controls, server: WebServer, world: str) -> None:
+        self._source, self._server = source, server
+        server.viser.scene.set_up_direction("+z")
+        server.viser.initial_camera.fov = FOV_RAD
+        self._scene = LiveScene(server.viser, world)
+        self._panel = ViewPanel(server.viser.gui, controls)
+        self._world = world
+        self._history = History()
+        self._past: tuple[Moment, ...] = ()
+        self._has_camera = False
+        self._shown_image: tuple[str, float] = ("", 0.0)
+        self._ended = threading.Event()
+        self.is_drawn = threading.Event()
+        """Set when the first shapes have been drawn."""
+        self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
+        self._thread.start()
+
+    @property
+    def link(self) -> str:
+        """Address of the page."""
+        return self._server.link
+
+    @property
+    def viewers(self) -> int:
+        """Number of connected viewers."""
+        return len(self._server.viser.get_clients())
+
+    def close(self) -> None:
+        """Ends the view, its thread and its web server."""
+        self._ended.set()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+        self._source.choose_image("")
+        self._server.close()
+
+    def _run(self) -> None:
+        due_s = {hz: 0.0 for hz in (IDLE_HZ, REFRESH_HZ, IMAGES_HZ)}
+        fault = ""
+        next_s = time.monotonic()
+        while not self._ended.is_set():
+            now_s = time.monotonic()
+            due = {hz for hz, at_s in due_s.items() if now_s >= at_s}
+            due_s |= {hz: now_s + 1.0 / hz for hz in due}
+            try:
+                self._draw(due)
+            except Exception as error:
+                if str(error) != fault:  # each is reported once, and the view stays
+                    fault = str(error)
+                    _log.exception("a part of the view cannot be drawn")
+            next_s = max(next_s + 1.0 / FRAMES_HZ, time.monotonic())
+            self._ended.wait(next_s - time.monotonic())
+
+    def _draw(self, due: set[float]) -> None:
+        moment = self._source.moment()
+        self._history.add(moment)
+        has_viewers = bool(self.viewers)
+        if not has_viewers and IDLE_HZ not in due:
+            return
+        self._panel.advance(1.0 / FRAMES_HZ)
+        self._scene.shows_frames, self._scene.shows_names = self._panel.shows_frames, self._panel.shows_names
+        self._scene.show(self._chosen(moment))
+        if not self._has_camera and any(isinstance(each, ShapeItem) for each in moment.items.values()):
+            self._look_at(moment)
+        if has_viewers and REFRESH_HZ in due or IDLE_HZ in due:
+            self._panel.refresh(self._source.images)
+        self._source.choose_image(self._panel.image if has_viewers else "")
+        if has_viewers and IMAGES_HZ in due:
+            self._show_image()
+
+    def _chosen(self, moment: Moment) -> Moment:
+        """Returns the moment at the chosen point of the time line."""
+        age_s = self._panel.age_s
+        if not age_s:
+            self._past = ()
+            return moment
+        self._past = self._past or self._history.copy()
+        return moment_at(self._past, age_s)
+
+    def _show_image(self) -> None:
+        chosen = self._panel.image
+        if not chosen:
+            if self._shown_image[0]:
+                self._panel.show_image(None)
+            self._shown_image = "", 0.0
+            return
+        arrival_s, pixels, camera = self._source.picture()
+        if pixels is None or self._shown_image == (chosen, arrival_s):
+            return
+        self._shown_image = chosen, arrival_s
+        self._panel.show_image(pixels)
+        if camera is not None and (frustum := self._scene.camera(camera)) is not None:
+            frustum.image = pixels
+
+    def _look_at(self, moment: Moment) -> None:
+        """Sets the camera of pages that are opened later, so that it sees all shapes."""
+        self._has_camera = True
+        poses, there = moment.poses(self._world), np.ones(1, bool)
+        links = []
+        for item in moment.items.values():
+            if isinstance(item, ShapeItem) and item.frame in poses:
+                pose = poses[item.frame]
+                where = Poses(np.array([pose.position]), Rotation.from_quat([pose.quat_xyzw]))
+                links.append(ShownLink(item.frame, item.frame, [item.shape], where, there))
+        camera: Any = self._server.viser.initial_camera
+        camera.position, camera.look_at = first_view(ResetDebugVisualizerCamera(), links, self._scene.meshes)
+        self.is_drawn.set()
