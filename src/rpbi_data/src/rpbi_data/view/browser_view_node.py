@@ -8,7 +8,6 @@ from pydantic import Field
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.schema import ConfigModel, Count, Text
-from rpbi.config.world import WORLD_FRAME
 
 HOST, PORT = "127.0.0.1", 8080
 FIRST_S = 5.0
@@ -23,7 +22,6 @@ class BrowserViewParameters(ConfigModel):
         description="Address to listen at. `0.0.0.0` serves other computers, too; the printed link then has a token.",
     )
     port: Count = Field(PORT, description="Port of the page; 0 chooses a free port.")
-    world_frame: Text = Field(WORLD_FRAME, description="TF frame of the world.")
 
 
 class BrowserViewNode:
@@ -42,9 +40,9 @@ class BrowserViewNode:
         parameters = private_parameters(BrowserViewParameters)
         namespace = rospy.get_namespace()
         server = WebServer(parameters.host, parameters.port)
-        source = TopicSource(namespace, parameters.world_frame)
+        source = TopicSource(namespace)
         controls = ServiceControls(namespace, source)
-        self._view = LiveView(source, controls, server, parameters.world_frame)
+        self._view = LiveView(source, controls, server)
         rospy.on_shutdown(self._view.close)
         self._view.is_drawn.wait(FIRST_S)
         print(f"view: {self._view.link}", flush=True)

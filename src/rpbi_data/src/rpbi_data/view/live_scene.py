@@ -63,11 +63,10 @@ class LiveScene:
 
     Args:
         server: The server of viser.
-        world: Name of the world frame.
     """
 
-    def __init__(self, server: Any, world: str) -> None:
-        self._server, self._api, self._world = server, server.scene, world
+    def __init__(self, server: Any) -> None:
+        self._server, self._api = server, server.scene
         self._nodes: dict[tuple[str, str], _Node] = {}
         self._items: Mapping[Name, Item] = {}
         self._drawn: dict[Name, Item] = {}
@@ -82,7 +81,7 @@ class LiveScene:
 
     def show(self, moment: Moment) -> None:
         """Draws a moment."""
-        poses = moment.poses(self._world)
+        poses = moment.poses()
         with self._server.atomic():
             if moment.items is not self._items:
                 self._show_items(moment.items)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Sequence
@@ -25,6 +26,8 @@ FRAMES_HZ, REFRESH_HZ, IMAGES_HZ = 30.0, 4.0, 10.0
 """Rates of poses, of the fields of the panel, and of images, in wall time [Hz]."""
 IDLE_HZ = 2.0
 """Rate at which the scene is drawn while nobody looks, so that the next viewer sees it at once [Hz]."""
+CAMERA_S = 1.0
+"""Longest time to wait for the configuration of the world after the first shapes [s]."""
 
 _log = logging.getLogger(__name__)
 
@@ -34,6 +37,10 @@ class ViewSource(Protocol):
 
     def moment(self) -> Moment:
         """Returns frames and items as they are now. A returned moment must never change."""
+
+    @property
+    def camera(self) -> ResetDebugVisualizerCamera | None:
+        """Camera of PyBullet's window in the configuration of the world; None if it is not known yet."""
 
     @property
     def images(self) -> Sequence[str]:
@@ -56,19 +63,17 @@ class LiveView:
         source: Content of the view.
         controls: Controls of the world.
         server: The web server, which `close` ends.
-        world: Name of the world frame.
     """
 
-    def __init__(self, source: ViewSource, controls: Controls, server: WebServer, world: str) -> None:
+    def __init__(self, source: ViewSource, controls: Controls, server: WebServer) -> None:
         self._source, self._server = source, server
         server.viser.scene.set_up_direction("+z")
         server.viser.initial_camera.fov = FOV_RAD
-        self._scene = LiveScene(server.viser, world)
+        self._scene = LiveScene(server.viser)
         self._panel = ViewPanel(server.viser.gui, controls)
-        self._world = world
         self._history = History()
         self._past: tuple[Moment, ...] = ()
-        self._has_camera = False
+        self._first_s = math.inf
         self._shown_image: tuple[str, float] = ("", 0.0)
         self._ended = threading.Event()
         self.is_drawn = threading.Event()
@@ -120,8 +125,10 @@ class LiveView:
         self._panel.advance(1.0 / FRAMES_HZ)
         self._scene.shows_frames, self._scene.shows_names = self._panel.shows_frames, self._panel.shows_names
         self._scene.show(self._chosen(moment))
-        if not self._has_camera and any(isinstance(each, ShapeItem) for each in moment.items.values()):
-            self._look_at(moment)
+        if not self.is_drawn.is_set() and any(isinstance(each, ShapeItem) for each in moment.items.values()):
+            self._first_s = min(self._first_s, moment.wall_s)
+            if self._source.camera is not None or moment.wall_s - self._first_s > CAMERA_S:
+                self._look_at(moment)
         if has_viewers and REFRESH_HZ in due or IDLE_HZ in due:
             self._panel.refresh(self._source.images)
         self._source.choose_image(self._panel.image if has_viewers else "")
@@ -154,8 +161,7 @@ class LiveView:
 
     def _look_at(self, moment: Moment) -> None:
         """Sets the camera of pages that are opened later, so that it sees all shapes."""
-        self._has_camera = True
-        poses, there = moment.poses(self._world), np.ones(1, bool)
+        poses, there = moment.poses(), np.ones(1, bool)
         links = []
         for item in moment.items.values():
             if isinstance(item, ShapeItem) and item.frame in poses:
@@ -163,5 +169,7 @@ class LiveView:
                 where = Poses(np.array([pose.position]), Rotation.from_quat([pose.quat_xyzw]))
                 links.append(ShownLink(item.frame, item.frame, [item.shape], where, there))
         camera: Any = self._server.viser.initial_camera
-        camera.position, camera.look_at = first_view(ResetDebugVisualizerCamera(), links, self._scene.meshes)
+        camera.position, camera.look_at = first_view(
+            self._source.camera or ResetDebugVisualizerCamera(), links, self._scene.meshes
+        )
         self.is_drawn.set()

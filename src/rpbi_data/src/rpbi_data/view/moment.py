@@ -126,24 +126,22 @@ class Moment:
     Attributes:
         wall_s: Time of the moment on the monotonic clock [s].
         time_s: ROS time or simulated time of the moment [s].
+        world: Name of the world frame.
         frames: Frames with their parents, indexed by name.
         items: Items to draw, indexed by name.
     """
 
     wall_s: float
     time_s: float
+    world: str
     frames: Mapping[str, Placed]
     items: Mapping[Name, Item]
 
-    def poses(self, world: str) -> dict[str, Pose]:
-        """Returns the poses of all frames that are connected with the world frame, in the world frame.
-
-        Args:
-            world: Name of the world frame.
-        """
-        found: dict[str, Pose] = {world: Pose()}
+    def poses(self) -> dict[str, Pose]:
+        """Returns the poses of all frames that are connected with the world frame, in the world frame."""
+        found: dict[str, Pose] = {self.world: Pose()}
         for name in self.frames:
-            chain = []
+            chain: list[str] = []
             while name not in found and name in self.frames and len(chain) < MAX_PARENTS:
                 chain.append(name)
                 name = self.frames[name].parent

@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from custom_ros_tools.errors import InterfaceError
 
 from .controls import MAX_STEPS, PRIMITIVES, Controls, JointRange, NewObject
@@ -20,6 +22,7 @@ MAX_FACTOR, MAX_DURATION_S = 1000.0, 600.0
 GOOD_S, BAD_S = 4.0, 15.0
 """Time for which a message is shown, if an action has succeeded and if it has failed [s]."""
 
+_BLANK = np.zeros((1, 1, 3), np.uint8)
 _log = logging.getLogger(__name__)
 
 
@@ -33,12 +36,7 @@ class ViewPanel:
         controls: Controls of the world.
 
     Attributes:
-        shows_frames: Whether viewers want to see the axes of frames.
-        shows_names: Whether viewers want to see the names of frames.
-        age_s: Chosen point of the time line, as time before the moment at which the time line was stopped [s]; 0 shows
-            the present.
         is_playing: Whether the past is being played.
-        image: Chosen topic of images; empty for none.
     """
 
     def __init__(self, gui: Any, controls: Controls) -> None:
@@ -48,6 +46,8 @@ class ViewPanel:
         self._moved: dict[str, float] = {}
         self._sliders: dict[str, Any] = {}
         self._robot = NOTHING
+        self._asked: float | None = None
+        """The real-time factor that the field shows; None before it is known."""
         self.is_playing = False
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._add_world()
@@ -63,18 +63,22 @@ class ViewPanel:
 
     @property
     def shows_frames(self) -> bool:
+        """Whether viewers want to see the axes of frames."""
         return bool(self._frames.value)
 
     @property
     def shows_names(self) -> bool:
+        """Whether viewers want to see the names of frames."""
         return bool(self._names.value)
 
     @property
     def age_s(self) -> float:
+        """Chosen point of the time line, before the moment at which it was stopped [s]; 0 shows the present."""
         return float(min(HISTORY_S, max(0.0, -self._time.value)))
 
     @property
     def image(self) -> str:
+        """Chosen topic of images; empty for none."""
         return "" if self._image.value == NOTHING else str(self._image.value)
 
     def advance(self, seconds: float) -> None:
@@ -95,7 +99,10 @@ class ViewPanel:
         if factor is not None and factor != self._asked:  # at the start, or changed by another program
             self._asked = factor
             self._factor.value = min(MAX_FACTOR, factor)
-        _offer(self._choice, controls.robots())
+        robots = controls.robots()
+        _offer(self._choice, robots)
+        if self._robot == NOTHING and robots:
+            self._choice.value = robots[0]
         _offer(self._object, controls.objects())
         _offer(self._image, images)
         if self._choice.value != self._robot:
@@ -118,8 +125,6 @@ class ViewPanel:
             self._picture.visible = True
 
     def _add_world(self) -> None:
-        import numpy as np
-
         gui = self._gui
         self._status = gui.add_text("World", "", disabled=True)
         buttons = gui.add_button_group("", COMMANDS)
@@ -127,12 +132,10 @@ class ViewPanel:
         steps = gui.add_number("Ticks", 100, min=1, max=MAX_STEPS, step=1, hint="Number of ticks of the next button")
         go = gui.add_button("Run these ticks", hint="Advances the stopped world by these ticks, as fast as possible")
         self._on(go, "Ticks", lambda _: self._controls.step(int(min(MAX_STEPS, max(1, steps.value)))))
-        self._asked: float | None = None
         self._factor = gui.add_number(
             "Real-time factor", 1.0, min=0.0, max=MAX_FACTOR, step=0.1, hint="Simulated seconds per second; 0: no limit"
         )
         self._on(self._factor, "Real-time factor", lambda event: self._set_factor(event.target.value))
-        self._blank = np.zeros((1, 1, 3), np.uint8)
 
     def _add_time_line(self) -> None:
         gui = self._gui
@@ -141,7 +144,7 @@ class ViewPanel:
         )
         play = gui.add_button_group("", ("Play", "Pause", "Now"))
 
-        @play.on_click  # type: ignore[misc]
+        @play.on_click
         def _(event: Any) -> None:
             if event.client is not None:
                 self.is_playing = event.target.value == "Play"
@@ -154,7 +157,7 @@ class ViewPanel:
             self._frames = gui.add_checkbox("Frames", False, hint="Axes of all frames on TF")
             self._names = gui.add_checkbox("Names of frames", False)
             self._image = gui.add_dropdown("Image", (NOTHING,), hint="Images of a camera, here and at its frustum")
-            self._picture = gui.add_image(self._blank, label="", format="jpeg", jpeg_quality=75, visible=False)
+            self._picture = gui.add_image(_BLANK, label="", format="jpeg", jpeg_quality=75, visible=False)
 
     def _add_joints(self) -> None:
         gui = self._gui
@@ -233,7 +236,7 @@ class ViewPanel:
             hint=f"{joint.lower:.3f} to {joint.upper:.3f} {joint.unit}",
         )
 
-        @slider.on_update  # type: ignore[misc]
+        @slider.on_update
         def _(event: Any) -> None:
             if event.client is not None:
                 with self._lock:

@@ -60,7 +60,7 @@ class WorldView:
         server = WebServer(host, port)
         self._source = _WorldSource(world)
         self._controls = _WorldControls(world)
-        self._view = LiveView(self._source, self._controls, server, WORLD_FRAME)
+        self._view = LiveView(self._source, self._controls, server)
         self._is_closed = False
         self.update()
 
@@ -120,11 +120,12 @@ class _WorldSource:
         self._shapes: dict[Name, Item] = {}
         self._surfaces: dict[Name, Item] = {}
         self._is_frame_due, self._is_surface_due, self._is_image_due = map(_Due, (FRAMES_HZ, SURFACES_HZ, IMAGES_HZ))
-        self._moment = Moment(time.monotonic(), 0.0, {}, {})
+        self._moment = Moment(time.monotonic(), 0.0, WORLD_FRAME, {}, {})
         self._renderer: CameraImages | None = None
         self._wanted = ""
         self._picture: tuple[float, Array | None, Name | None] = (0.0, None, None)
         self.images: Sequence[str] = ()
+        self.camera = world.config.resetDebugVisualizerCamera
 
     def moment(self) -> Moment:
         """Returns the content at the last update."""
@@ -152,7 +153,7 @@ class _WorldSource:
             self._surfaces = dict(self._all_surfaces())
         frames = dict(self._frames())
         items = {**self._shapes, **self._surfaces, **dict(self._arrows())}
-        self._moment = Moment(time.monotonic(), world.clock.time_s, frames, items)
+        self._moment = Moment(time.monotonic(), world.clock.time_s, WORLD_FRAME, frames, items)
         self.images = tuple(world.cameras)
         if self._wanted in world.cameras and self._is_image_due():
             self._draw(self._wanted)
@@ -377,4 +378,8 @@ class _WorldControls:
         """Not supported."""
         raise InterfaceError("a script records by World.save")
 
-    end_recording = label = record  # type: ignore[assignment]
+    label = record
+
+    def end_recording(self) -> str:
+        """Not supported."""
+        return self.record("")

@@ -6,6 +6,7 @@ Topics are found by their types, so that markers of other nodes and cameras that
 from __future__ import annotations
 
 import io
+import json
 import logging
 import math
 import threading
@@ -19,14 +20,18 @@ import numpy as np
 import rospy
 from PIL import Image as Picture
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.topic_table import TopicRow, TopicTable
 from robot_model.asset_files import find_file
 from robot_model.geometry import Pose, normalized
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
+from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
+from rpbi.config.world import WORLD_FRAME
 
 from .moment import CameraItem, Item, LinesItem, Moment, Name, Placed, ShapeItem, SurfaceItem, TextItem, is_finite
 from .scene import Array
@@ -64,12 +69,15 @@ class TopicSource:
 
     Args:
         namespace: Namespace of the topics, with slashes at both ends.
-        world: Full name of the world frame.
-        table: Table of topics, whose changes are reported to `on_change`.
+
+    Attributes:
+        camera: Camera of PyBullet's window in the configuration of the world; None if it is not known yet.
+        state: Last message on `rpbi/state`; None before the first one.
+        table: Topics and services of the ROS system.
     """
 
-    def __init__(self, namespace: str, world: str) -> None:
-        self._namespace, self._world = namespace, world
+    def __init__(self, namespace: str) -> None:
+        self._namespace, self._world = namespace, WORLD_FRAME
         self._lock = threading.Lock()
         self._frames: dict[str, tuple[Placed, float]] = {}
         """Poses of frames, and the times of their last messages [s]; inf for static frames."""
@@ -81,11 +89,13 @@ class TopicSource:
         self._image: rospy.Subscriber | None = None
         self._image_topic = ""
         self._picture: tuple[float, Any] = (0.0, None)
+        self.camera: ResetDebugVisualizerCamera | None = None
         self.state: SimulationState | None = None
         self._state_s = -math.inf
         for topic, is_static in (("/tf", False), ("/tf_static", True)):
             rospy.Subscriber(topic, TFMessage, partial(self._on_tf, is_static), queue_size=100, tcp_nodelay=True)
         rospy.Subscriber(f"{namespace}rpbi/state", SimulationState, self._on_state, queue_size=1)
+        rospy.Subscriber(f"{namespace}rpbi/world_description", String, self._on_description, queue_size=1)
         self.table = TopicTable(self._on_topic)
         self.table.watch()
 
@@ -103,7 +113,7 @@ class TopicSource:
                 self._frames = {name: each for name, each in self._frames.items() if each[1] > oldest_s}
             frames = {name: placed for name, (placed, _) in self._frames.items()}
             items, state = self._items, self.state
-        return Moment(now_s, state.simulated_time if state else 0.0, frames, items)
+        return Moment(now_s, state.simulated_time if state else 0.0, self._world, frames, items)
 
     @property
     def state_age_s(self) -> float:
@@ -160,6 +170,16 @@ class TopicSource:
 
     def _on_state(self, message: SimulationState) -> None:
         self.state, self._state_s = message, time.monotonic()
+
+    def _on_description(self, message: String) -> None:
+        """Reads the prefix of TF frames, and the camera."""
+        try:
+            (config,) = json.loads(json.loads(message.data)["config"]).values()
+            self._world = f"{config.get('tf_prefix') or ''}/{WORLD_FRAME}".lstrip("/")
+            own = config.get("resetDebugVisualizerCamera", {})
+            self.camera = ResetDebugVisualizerCamera.parse(own, "rpbi/world_description")
+        except (ValueError, KeyError, AttributeError, InterfaceError) as error:
+            _log.warning("the description of the world cannot be read: %s", error)
 
     def _on_topic(self, before: TopicRow | None, after: TopicRow | None) -> None:
         """Subscribes to a topic that is shown; forgets the items of a topic whose publishers have changed."""
@@ -252,11 +272,12 @@ def item_of(marker: Marker, world: str) -> Item:
         raise ValueError("its pose is not finite")
     pose = Pose(pose.position, normalized(pose.quat_xyzw))
     frame = marker.header.frame_id.lstrip("/") or world
-    rgba = tuple(min(1.0, max(0.0, each)) for each in (marker.color.r, marker.color.g, marker.color.b, marker.color.a))
+    red, green, blue, alpha = np.clip((marker.color.r, marker.color.g, marker.color.b, marker.color.a), 0.0, 1.0)
+    rgba = float(red), float(green), float(blue), float(alpha)
     if marker.type in SHAPES:
         kind = SHAPES[marker.type]
-        if kind is ShapeKind.MESH and marker.mesh_use_embedded_materials and not marker.color.a:
-            rgba = (0.7, 0.7, 0.7, 1.0)
+        if kind is ShapeKind.MESH and not any(rgba):  # only the materials of the mesh
+            rgba = 0.7, 0.7, 0.7, 1.0
         file = _mesh_file(marker.mesh_resource) if kind is ShapeKind.MESH else ""
         shape = BodyShape(-1, marker.ns, kind, (size.x, size.y, size.z), pose, rgba, file)  # type: ignore[arg-type]
         return ShapeItem(frame, pose, shape)
@@ -266,17 +287,17 @@ def item_of(marker: Marker, world: str) -> Item:
     if len(points) > MAX_POINTS or not np.isfinite(points).all():
         raise ValueError(f"expected at most {MAX_POINTS} finite points")
     if marker.type == Marker.TRIANGLE_LIST and len(points) % 3 == 0:
-        return SurfaceItem(frame, pose, points * np.array((size.x, size.y, size.z), np.float32), rgba)  # type: ignore
+        return SurfaceItem(frame, pose, points * np.array((size.x, size.y, size.z), np.float32), rgba)
     if marker.type == Marker.ARROW:
         if len(points) == 0:
             points = np.array([(0.0, 0.0, 0.0), (size.x, 0.0, 0.0)], np.float32)
-            return LinesItem(frame, pose, points[None], rgba, size.y, True)  # type: ignore[arg-type]
+            return LinesItem(frame, pose, points[None], rgba, size.y, True)
         if len(points) == 2:
-            return LinesItem(frame, pose, points[None], rgba, size.x, True)  # type: ignore[arg-type]
+            return LinesItem(frame, pose, points[None], rgba, size.x, True)
     if marker.type == Marker.LINE_STRIP:
-        return LinesItem(frame, pose, np.stack([points[:-1], points[1:]], 1), rgba, size.x or LINE_M, False)  # type: ignore
+        return LinesItem(frame, pose, np.stack([points[:-1], points[1:]], 1), rgba, size.x or LINE_M, False)
     if marker.type == Marker.LINE_LIST and len(points) % 2 == 0:
-        return LinesItem(frame, pose, points.reshape(-1, 2, 3), rgba, size.x or LINE_M, False)  # type: ignore[arg-type]
+        return LinesItem(frame, pose, points.reshape(-1, 2, 3), rgba, size.x or LINE_M, False)
     raise ValueError(f"its type is {marker.type}, with {len(points)} points")
 
 
