@@ -37,7 +37,7 @@ from .moment import CameraItem, Item, LinesItem, Moment, Name, Placed, ShapeItem
 from .scene import Array
 
 MAX_FRAME_AGE_S, TF_PAUSE_S = 10.0, 1.0
-"""A frame vanishes if it was not published for `MAX_FRAME_AGE_S`, while others were in the last `TF_PAUSE_S` [s]."""
+"""A frame is removed if it was not published for `MAX_FRAME_AGE_S`, while others were in the last `TF_PAUSE_S` [s]."""
 MAX_IMAGE_PX = 480
 """Width of an image in the view; larger images are scaled down [px]."""
 MAX_IMAGE_BYTES = 50_000_000
@@ -58,7 +58,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Received(NamedTuple):
-    """An item from a topic, and the time after which it vanishes [s]."""
+    """An item from a topic, and the time after which it is removed [s]."""
 
     item: Item
     end_s: float = math.inf
