@@ -26,6 +26,8 @@ FRUSTUM_M = 0.15
 AXIS_M, AXIS_RADIUS_M = 0.12, 0.003
 """Length and radius of the axes of frames [m]."""
 FRAMES = "/frames"
+SLASH = "\u2215"
+"""A character that looks like a slash, for names of nodes, in which slashes separate parts."""
 
 _log = logging.getLogger(__name__)
 
@@ -59,7 +61,7 @@ class _Node:
 class LiveScene:
     """Draws a moment, and sends only the changes since the moment that was drawn before.
 
-    Each item is below a node of its frame, such as `/box/rpbi%2Fbox/0`; viewers can hide nodes by their names.
+    Each item is below a node of its frame, such as `/box/rpbi∕box/0`; viewers can hide nodes by their names.
 
     Args:
         server: The server of viser.
@@ -217,5 +219,5 @@ def _wxyz(pose: Pose) -> tuple[float, float, float, float]:
 
 
 def _part(name: str) -> str:
-    """Converts any name to a part of a node's name, which is unique and not empty."""
-    return quote(name, safe=" ") or "-"
+    """Converts any name to a part of a node's name, which is unique and not empty. Viewers see these names."""
+    return name.replace("%", "%25").replace(SLASH, quote(SLASH)).replace("/", SLASH) or "-"

@@ -51,8 +51,15 @@ SHAPES = {
     Marker.CYLINDER: ShapeKind.CYLINDER,
     Marker.MESH_RESOURCE: ShapeKind.MESH,
 }
-LAYOUTS = {"rgb8": (3, [0, 1, 2]), "bgr8": (3, [2, 1, 0]), "mono8": (1, [0, 0, 0])}
-"""Encodings of shown raw images: number of channels, and indices of red, green and blue."""
+LAYOUTS = {
+    "rgb8": ("u1", 3, [0, 1, 2]),
+    "bgr8": ("u1", 3, [2, 1, 0]),
+    "mono8": ("u1", 1, [0, 0, 0]),
+    "32FC1": ("f4", 1, [0, 0, 0]),
+    "16UC1": ("u2", 1, [0, 0, 0]),
+    "mono16": ("u2", 1, [0, 0, 0]),
+}
+"""Encodings of shown raw images: type of a value, number of channels, and indices of red, green and blue."""
 
 _log = logging.getLogger(__name__)
 
@@ -151,10 +158,10 @@ class TopicSource:
             3), or None without an image that can be read, and the name of the camera's item, if it is known.
         """
         arrival_s, message = self._picture
-        topic = f"{self._namespace}{self._image_topic}".removesuffix("/compressed")
-        info = f"{topic.rpartition('/')[0]}/camera_info"
-        camera = (CAMERA, info) if info in self._received else None
-        return arrival_s, None if message is None else pixels_of(message), camera
+        if message is None:
+            return arrival_s, None, None
+        name = CAMERA, message.header.frame_id.lstrip("/")
+        return arrival_s, pixels_of(message), name if name in self._items else None
 
     def _on_tf(self, is_static: bool, message: TFMessage) -> None:
         now_s = time.monotonic()
@@ -182,18 +189,18 @@ class TopicSource:
             _log.warning("the description of the world cannot be read: %s", error)
 
     def _on_topic(self, before: TopicRow | None, after: TopicRow | None) -> None:
-        """Subscribes to a topic that is shown; forgets the items of a topic whose publishers have changed."""
+        """Subscribes to a topic that is shown. Begins anew if a publisher has left, whose items must not stay."""
         name = (after or before).name  # type: ignore[union-attr]
-        kinds = (before.type if before else "", after.type if after else "")
-        handler = _HANDLERS.get(kinds[1])
-        if name in self._subscribers and kinds[0] != kinds[1]:
-            self._subscribers.pop(name).unregister()
-        if before is not None and before.publishers - (after.publishers if after else frozenset()):
+        if not name.startswith(self._namespace):
+            return
+        if before is not None and (after is None or after.type != before.type or before.publishers - after.publishers):
+            if name in self._subscribers:
+                self._subscribers.pop(name).unregister()
             with self._lock:
                 self._received.pop(name, None)
                 self._collect()
-        if handler is not None and name.startswith(self._namespace) and name not in self._subscribers:
-            kind, method = handler
+        if after is not None and after.type in _HANDLERS and name not in self._subscribers:
+            kind, method = _HANDLERS[after.type]
             self._subscribers[name] = rospy.Subscriber(name, kind, partial(method, self, name), queue_size=20)
 
     def _on_markers(self, topic: str, message: MarkerArray) -> None:
@@ -205,7 +212,8 @@ class TopicSource:
     def _apply(self, topic: str, markers: list[Marker]) -> None:
         now_s = time.monotonic()
         with self._lock:
-            of_topic = dict(self._received.get(topic, {}))
+            known = self._received.get(topic, {})
+            of_topic = {} if topic == f"{self._namespace}rpbi/markers" else dict(known)  # that one is always complete
             for marker in markers:
                 name = marker.ns or topic, f"{topic} {marker.id}"
                 if marker.action == Marker.DELETEALL:
@@ -219,7 +227,7 @@ class TopicSource:
                         _log.warning("%s: marker %d of '%s' is not shown: %s", topic, marker.id, marker.ns, error)
                         continue
                     lifetime_s = marker.lifetime.to_sec()
-                    before = of_topic.get(name)
+                    before = known.get(name)
                     if before is not None and _equals(before.item, item):
                         item = before.item
                     of_topic[name] = _Received(item, now_s + lifetime_s if lifetime_s > 0.0 else math.inf)
@@ -230,13 +238,14 @@ class TopicSource:
         if not (message.K[4] > 0.0 and message.height and message.width):
             return
         fov_rad = 2.0 * math.atan(message.height / 2.0 / message.K[4])
-        item = CameraItem(message.header.frame_id.lstrip("/"), Pose(), fov_rad, message.width / message.height)
-        name = CAMERA, topic
+        frame = message.header.frame_id.lstrip("/")
+        item = CameraItem(frame, Pose(), fov_rad, message.width / message.height)
         with self._lock:
-            before = self._received.get(topic, {}).get(name)
-            if before is None or not _equals(before.item, item):
-                self._received[topic] = {name: _Received(item)}
-                self._collect()
+            self._received[topic] = {(CAMERA, frame): _Received(item)}
+            self._collect()
+            subscriber = self._subscribers.pop(topic, None)
+        if subscriber is not None:
+            subscriber.unregister()  # a simulator draws images as long as someone wants to know the camera
 
     def _on_image(self, message: Any) -> None:
         self._picture = time.monotonic(), message
@@ -308,9 +317,13 @@ def pixels_of(message: Any) -> Array | None:
     """
     try:
         if isinstance(message, Image):
-            channels, order = LAYOUTS[message.encoding]
-            rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
-            pixels = rows[:, : message.width * channels].reshape(message.height, message.width, channels)[..., order]
+            kind, channels, order = LAYOUTS[message.encoding]
+            rows = np.frombuffer(message.data, np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<"))
+            rows = rows.reshape(message.height, -1)[:, : message.width * channels]
+            pixels = rows.reshape(message.height, message.width, channels)[..., order]
+            if kind != "u1":  # such as depth: from black to white, the greatest finite value
+                values = np.nan_to_num(pixels.astype(float), nan=0.0, posinf=0.0, neginf=0.0)
+                pixels = (255.0 * np.clip(values / (values.max() or 1.0), 0.0, 1.0)).astype(np.uint8)
             picture = Picture.fromarray(pixels)
         else:
             picture = Picture.open(io.BytesIO(message.data), formats=("JPEG", "PNG"))
