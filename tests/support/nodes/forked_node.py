@@ -33,6 +33,7 @@ PACKAGES = {
     "operator_node",
     "rpbi_mpc",
     "ros_pybullet_interface",
+    "rpbi_data",
     "rpbi_examples",
     "rpbi_ros2",
     "rpbi_utils",

@@ -88,7 +88,12 @@ class Viewer:
 
     def press(self, label: str) -> None:
         """Presses a button, which may be one of a group."""
-        group = next((each for each in list(self.fields.values()) if label in each.get("options", ())), None)
+
+        def group_of() -> dict[str, Any] | None:
+            return next((each for each in list(self.fields.values()) if label in each.get("options", ())), None)
+
+        self.wait(lambda: self.find(label) or group_of())
+        group = group_of()
         if group is None or self.find(label) is not None:
             self.set(label, True)
         else:
@@ -97,6 +102,10 @@ class Viewer:
     def find(self, label: str) -> dict[str, Any] | None:
         """Returns the field with a label; None if there is none."""
         return next((each for each in list(self.fields.values()) if each.get("label") == label), None)
+
+    def offers(self, label: str, option: str) -> bool:
+        """Returns whether a field offers an option."""
+        return option in (self.find(label) or {}).get("options", ())
 
     def value(self, label: str) -> Any:
         """Returns the value of a field; None without the field."""

@@ -69,6 +69,7 @@ class LiveScene:
 
     def __init__(self, server: Any) -> None:
         self._server, self._api = server, server.scene
+        self._groups: dict[str, Any] = {}
         self._nodes: dict[tuple[str, str], _Node] = {}
         self._items: Mapping[Name, Item] = {}
         self._drawn: dict[Name, Item] = {}
@@ -100,14 +101,14 @@ class LiveScene:
         gone = [name for name, item in self._drawn.items() if not _continues(item, items.get(name))]
         for name in gone:
             self._remove(name)
-        new = {name: item for name, item in items.items() if self._drawn.get(name) is not item}
+        changed = {name: item for name, item in items.items() if self._drawn.get(name) is not item}
+        for name in changed.keys() & self._drawn.keys():
+            _update(self._handles[name], changed[name])
+        new = {name: item for name, item in changed.items() if name not in self._drawn}
         meshes = self._meshes(item.shape for item in new.values() if isinstance(item, ShapeItem))
         for name, item in new.items():
-            if name in self._handles and name in self._drawn:
-                _update(self._handles[name], item)
-            else:
-                self._add(name, item, meshes)
-            self._drawn[name] = item
+            self._add(name, item, meshes)
+        self._drawn.update(changed)
 
     def _meshes(self, shapes: Iterable[BodyShape]) -> Mapping[BodyShape, TriangleMesh]:
         meshes, notes = meshes_of(shapes, MAX_TRIANGLES)
@@ -120,6 +121,8 @@ class LiveScene:
 
     def _add(self, name: Name, item: Item, meshes: Mapping[BodyShape, TriangleMesh]) -> None:
         key = name[0], item.frame
+        if name[0] not in self._groups:
+            self._groups[name[0]] = self._api.add_frame(f"/{_part(name[0])}", show_axes=False)
         if key not in self._nodes:
             self._nodes[key] = _Node(self._api, f"/{_part(name[0])}/{_part(item.frame)}")
         node = self._nodes[key]
@@ -137,6 +140,8 @@ class LiveScene:
         node.items.discard(name)
         if not node.items:
             self._nodes.pop(key).remove()
+            if not any(group == name[0] for group, _ in self._nodes):
+                self._groups.pop(name[0]).remove()
         elif handle is not None:
             handle.remove()
 
@@ -169,9 +174,11 @@ def _continues(item: Item, later: Item | None) -> bool:
     """Returns whether the node of a drawn item can show a later item."""
     if later is item:
         return True
-    if later is None or type(later) is not type(item) or isinstance(later, ShapeItem | TextItem | CameraItem):
+    if later is None or type(later) is not type(item) or later.frame != item.frame:
         return False
-    if (later.frame, later.pose) != (item.frame, item.pose):
+    if isinstance(item, ShapeItem) and isinstance(later, ShapeItem):
+        return later.shape._replace(pose_in_link=item.shape.pose_in_link) == item.shape
+    if isinstance(later, TextItem | CameraItem) or later.pose != item.pose:
         return False
     if isinstance(item, SurfaceItem) and isinstance(later, SurfaceItem):
         return len(later.corners) == len(item.corners) and later.rgba == item.rgba
@@ -181,7 +188,11 @@ def _continues(item: Item, later: Item | None) -> bool:
 
 
 def _update(handle: Any, item: Item) -> None:
-    if isinstance(item, SurfaceItem):
+    if handle is None:  # its mesh cannot be read
+        return
+    if isinstance(item, ShapeItem):
+        handle.position, handle.wxyz = item.pose.position, _wxyz(item.pose)
+    elif isinstance(item, SurfaceItem):
         handle.vertices = item.corners
     elif isinstance(item, LinesItem):
         handle.points = item.points
@@ -204,7 +215,9 @@ def _drawn_item(api: Any, name: str, item: Item) -> Any:
     if isinstance(item, TextItem):
         return api.add_label(name, item.text, position=item.pose.position)
     if isinstance(item, CameraItem):
-        return api.add_camera_frustum(name, item.fov_rad, item.aspect, scale=FRUSTUM_M, **pose)
+        return api.add_camera_frustum(
+            name, item.fov_rad, item.aspect, scale=FRUSTUM_M, thickness=FRUSTUM_M / 50, **pose
+        )
     return None
 
 

@@ -29,7 +29,8 @@ _log = logging.getLogger(__name__)
 class ViewPanel:
     """Fields of a live view, which all viewers share: if one moves a slider, the others see it move.
 
-    An action runs in a thread of its own. While it runs, further requests for the same action are ignored.
+    An action runs in a thread of its own. While it runs, it cannot be requested again; of a field whose value is changed
+    meanwhile, the last value is applied afterwards.
 
     Args:
         gui: The fields of viser.
@@ -42,7 +43,8 @@ class ViewPanel:
     def __init__(self, gui: Any, controls: Controls) -> None:
         self._gui, self._controls = gui, controls
         self._lock = threading.Lock()
-        self._running: set[str] = set()
+        self._running: dict[str, Any] = {}
+        """The last event of each running action that came while the action ran; None without one."""
         self._moved: dict[str, float] = {}
         self._sliders: dict[str, Any] = {}
         self._robot = NOTHING
@@ -289,26 +291,33 @@ class ViewPanel:
             title = name or (event.target.value if isinstance(event.target.value, str) else event.target.label)
             with self._lock:
                 if title in self._running:
+                    self._running[title] = event
                     return
-                self._running.add(title)
-            try:
-                text, is_good = action(event), True
-            except InterfaceError as error:
-                text, is_good = str(error), False
-            except Exception as error:
-                _log.warning("%s: %s", title, error, exc_info=True)
-                text, is_good = f"{type(error).__name__}: {error}", False
-            finally:
+                self._running[title] = None
+            while event is not None:
+                self._perform(event, title, action)
                 with self._lock:
-                    self._running.discard(title)
-            event.client.add_notification(
-                title, text, auto_close_seconds=GOOD_S if is_good else BAD_S, color="green" if is_good else "red"
-            )
+                    later = self._running.pop(title)
+                    event = None if hasattr(handle, "on_click") else later
+                    if event is not None:
+                        self._running[title] = None
 
         if hasattr(handle, "on_click"):
             handle.on_click(act)
         else:
             handle.on_update(act)
+
+    def _perform(self, event: Any, title: str, action: Callable[[Any], str]) -> None:
+        try:
+            text, is_good = action(event), True
+        except InterfaceError as error:
+            text, is_good = str(error), False
+        except Exception as error:
+            _log.warning("%s: %s", title, error, exc_info=True)
+            text, is_good = f"{type(error).__name__}: {error}", False
+        event.client.add_notification(
+            title, text, auto_close_seconds=GOOD_S if is_good else BAD_S, color="green" if is_good else "red"
+        )
 
 
 def _offer(dropdown: Any, names: Sequence[str]) -> None:

@@ -133,7 +133,7 @@ class Gate:
         """Returns the response to a request that is refused or redirected; None if the request is to be served."""
         try:
             fault = self._fault(request)
-        except (WebSocketException, ValueError, KeyError, CookieError):  # such as two headers of one name
+        except (WebSocketException, ValueError, LookupError, CookieError):  # such as two headers of one name
             fault = "the request is faulty"
         if fault:
             return _response(HTTPStatus.FORBIDDEN, f"{fault}\n")
@@ -224,9 +224,11 @@ _PROTOCOL = f"viser-v{viser.__version__}"
 
 def _listen(host: str, port: int) -> socket.socket:
     try:
+        if not 0 <= port < 1 << 16:
+            raise OSError("expected a port from 0 to 65535")
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
         listening = socket.create_server(address[:2], family=family)
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         reason = getattr(error, "strerror", None) or error
         raise InterfaceError(f"the view cannot listen at {host}, port {port}: {reason}; choose another port") from None
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
