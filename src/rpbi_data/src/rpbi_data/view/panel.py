@@ -29,8 +29,8 @@ _log = logging.getLogger(__name__)
 class ViewPanel:
     """Fields of a live view, which all viewers share: if one moves a slider, the others see it move.
 
-    An action runs in a thread of its own. While it runs, it cannot be requested again; of a field whose value is changed
-    meanwhile, the last value is applied afterwards.
+    An action runs in a thread of its own. While it runs, it cannot be requested again. If the value of a field is
+    changed meanwhile, the last value is applied afterwards.
 
     Args:
         gui: The fields of viser.
