@@ -33,8 +33,8 @@ BRIDGE = b"rpbi_ros2 "
 """Beginning of the user data by which bridges recognize each other."""
 PREFIX = "rt"
 """Beginning of the names of topics of ROS 2 in DDS."""
-DEPTH, LARGE_DEPTH = 1000, 10
-"""Messages that are kept for a reader that does not keep up; 1 s at 1 kHz, and of messages with blocks of bytes."""
+DEPTH, LARGE_DEPTH = 1000, 30
+"""Messages that are kept for a reader that does not keep up; 1 s at 1 kHz; and of messages with blocks of bytes, 1 s at 30 Hz."""
 BLOCKING_S = 0.0
 """Longest time for which a writer waits for readers [s]."""
 MAX_TAKEN = 256
@@ -53,10 +53,14 @@ CONFIG = """\
   <Discovery>
     <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>{peers}
   </Discovery>
-  <Internal><Watermarks><WhcHigh>32MB</WhcHigh></Watermarks></Internal>
+  <Internal>
+    <Watermarks><WhcHigh>64MB</WhcHigh></Watermarks>
+    <BurstSize><MaxInitTransmit>131072</MaxInitTransmit><MaxRexmit>131072B</MaxRexmit></BurstSize>
+  </Internal>
   <Tracing><Verbosity>none</Verbosity></Tracing>
 </Domain></CycloneDDS>"""
-"""Configuration of Cyclone DDS."""
+"""Configuration of Cyclone DDS. Bursts are shorter than the usual buffer of a socket, 208 KiB: a reader that loses a part
+of an image has to ask for it."""
 
 
 class Bridge(NamedTuple):

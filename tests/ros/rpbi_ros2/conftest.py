@@ -1,0 +1,25 @@
+"""What tests of the bridge share: a domain of their own, and ROS 2 in it."""
+
+from __future__ import annotations
+
+import os
+from urllib.parse import urlparse
+
+import pytest
+from ros2_system import Ros2
+from ros_system import RosSystem
+
+FIRST_DOMAIN, FIRST_PORT = 60, 21000
+"""Domain for the first port of masters, so that workers on one computer do not meet."""
+
+
+@pytest.fixture
+def domain(ros_master: str) -> int:
+    """The worker's domain."""
+    return FIRST_DOMAIN + ((urlparse(os.environ["ROS_MASTER_URI"]).port or FIRST_PORT) - FIRST_PORT) % 100
+
+
+@pytest.fixture
+def ros2(ros: RosSystem, domain: int) -> Ros2:
+    """Starts programs with ROS 2, which end with the test."""
+    return Ros2(ros, domain)
