@@ -31,6 +31,8 @@ OPTIONS = (
     "--disable-component-update",
     "--password-store=basic",
 )
+MAX_ANSWER_S = 400.0
+"""Longest time until the browser answers [s]; without a graphics card, a busy computer draws slowly."""
 
 
 class Tab:
@@ -53,7 +55,7 @@ class Tab:
         self._number += 1
         self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
         while True:
-            message = json.loads(self._socket.recv(timeout=120.0))
+            message = json.loads(self._socket.recv(timeout=MAX_ANSWER_S))
             if message.get("id") == self._number:
                 if "error" in message:
                     raise RuntimeError(f"{method}: {message['error']}")
