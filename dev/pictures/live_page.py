@@ -19,9 +19,9 @@ from browser import Tab, browser
 from rviz_worlds import PUSH_N, push_n
 from viewer import Viewer
 
-SIZE = (1280, 800)
+SIZE = (1280, 880)
 IMAGE = "rpbi/camera/colour/image/compressed"
-CAMERA = "initialCameraPosition=1.35,-2.75,1.75&initialCameraLookAt=0.15,-0.35,0.55"
+CAMERA = "initialCameraPosition=2.2,-3.3,2.3&initialCameraLookAt=0.3,-0.6,0.7"
 """Position of the page's camera, and point that it looks at [m], from which the camera of the world is seen."""
 CLOSE = "[...document.querySelectorAll('[class*=Notification-closeButton]')].map((each) => each.click()).length"
 DRAWN_S = 5.0

@@ -109,6 +109,7 @@ class Browser:
 
     def __init__(self, width: int, height: int) -> None:
         assert CHROMIUM is not None
+        self._size = width, height
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         options = (*OPTIONS, f"--user-data-dir={self._folder.name}", f"--window-size={width},{height}", "about:blank")
         output = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -128,7 +129,15 @@ class Browser:
             socket.send(json.dumps({"id": 1, "method": "Target.createTarget", "params": {"url": "about:blank"}}))
             while (message := json.loads(socket.recv(timeout=60.0))).get("id") != 1:
                 pass
-        return Tab(f"{self._address}/devtools/page/{message['result']['targetId']}")
+        tab = Tab(f"{self._address}/devtools/page/{message['result']['targetId']}")
+        tab.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=self._size[0],
+            height=self._size[1],
+            deviceScaleFactor=1,
+            mobile=False,
+        )
+        return tab
 
     def close(self) -> None:
         """Ends the browser and all of its processes."""

@@ -21,7 +21,7 @@ STILL = 1e-5
 """Change of a coordinate [m] or a quaternion component above which a pose is sent."""
 MAX_TRIANGLES = 150_000
 """Number of triangles of bodies that appear together, above which their meshes are simplified."""
-FRUSTUM_M = 0.15
+FRUSTUM_M = 0.3
 """Height of the frustum of a camera [m]."""
 AXIS_M, AXIS_RADIUS_M = 0.12, 0.003
 """Length and radius of the axes of frames [m]."""
@@ -216,7 +216,7 @@ def _drawn_item(api: Any, name: str, item: Item) -> Any:
         return api.add_label(name, item.text, position=item.pose.position)
     if isinstance(item, CameraItem):
         return api.add_camera_frustum(
-            name, item.fov_rad, item.aspect, scale=FRUSTUM_M, thickness=FRUSTUM_M / 50, **pose
+            name, item.fov_rad, item.aspect, scale=FRUSTUM_M, thickness=FRUSTUM_M / 100, **pose
         )
     return None
 
