@@ -55,6 +55,7 @@ EXTRA_OF = {
     "casadi": "mpc",
     "cv2": "tags",
     "viser": "html",
+    "foxglove": "foxglove",
     "trimesh": "html",
     "fast_simplification": "html",
     "msgspec": "html",
