@@ -57,7 +57,7 @@ class Simulator:
     def is_connected(self):
         return self._requests.get_subscription_count() > 0
 
-    def call(self, name, on_feedback=None, is_cancelled=None, **arguments):
+    def call(self, function, on_feedback=None, is_cancelled=None, /, **arguments):
         """Calls a function of the simulator. Returns its answer, which has `success` and `message`."""
         end = time.monotonic() + CONNECT_S
         while not self.is_connected():
@@ -67,7 +67,7 @@ class Simulator:
         number = uuid.uuid4().hex
         answers = self._answers[number] = queue.Queue()
         try:
-            self._send(number, name, arguments)
+            self._send(number, function, arguments)
             end = time.monotonic() + ANSWER_S
             while time.monotonic() < end:
                 if is_cancelled and is_cancelled():

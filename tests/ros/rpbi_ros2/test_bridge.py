@@ -9,29 +9,12 @@ from typing import Any
 import pytest
 import rospy
 from geometry_msgs.msg import Twist, WrenchStamped
+from ros2_system import JOINTS, STATE, connect
 from ros_system import wait_until
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Float64MultiArray, String
 
-JOINTS = [f"arm_{i}_joint" for i in range(7)]
-SETTLED_S = 0.3
-"""Time in which messages that were sent arrive [s]."""
-STATE = "sensor_msgs/msg/JointState"
 TEXT = "std_msgs/msg/String"
-
-
-@pytest.fixture
-def publisher(ros):
-    """Makes publishers of ROS 1 that end with the test."""
-    made = []
-
-    def publish(topic: str, message_class: Any, **options: Any) -> rospy.Publisher:
-        made.append(rospy.Publisher(topic, message_class, **{"queue_size": 1000, **options}))
-        return made[-1]
-
-    yield publish
-    for each in made:
-        each.unregister()
 
 
 def send(publisher: rospy.Publisher, messages: list[Any], hz: float) -> list[float]:
@@ -53,19 +36,6 @@ def states(count: int) -> list[JointState]:
         state.header.stamp = rospy.Time(1 + i // 1000, i % 1000 * 1_000_000)
         made.append(state)
     return made
-
-
-def connect(peer: Any, topic: str, publisher: rospy.Publisher, message: Any) -> int:
-    """Sends a message until a reader of ROS 2 gets it; returns how many the reader has got."""
-    wait_until(publisher.get_num_connections, f"{topic} is carried")
-
-    def is_heard() -> bool:
-        publisher.publish(message)
-        return bool(peer.count(topic))
-
-    wait_until(is_heard, f"{topic} is heard")
-    time.sleep(SETTLED_S)
-    return int(peer.count(topic))
 
 
 @pytest.mark.quick

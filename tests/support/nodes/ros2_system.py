@@ -8,6 +8,8 @@ import os
 import pwd
 import shutil
 import subprocess
+import tempfile
+import time
 from collections.abc import Callable
 from functools import cache
 from multiprocessing.connection import Client
@@ -15,14 +17,24 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rospy
 from ros_system import SUPPORT, RosSystem, wait_until
 
 REQUIREMENTS = SUPPORT / "ros2/requirements.txt"
 HOME = Path(pwd.getpwuid(os.getuid()).pw_dir)
 COMPANION = SUPPORT.parents[1] / "src/rpbi_ros2/companion/rpbi_companion.py"
-BUILT_WITH = "/opt/python/cp312-cp312"
-"""Path of Python where the wheels were built, which their CMake files have."""
+BUILT_WITH = (
+    "/opt/python/cp312-cp312/include/python3.12",
+    "/opt/python/cp312-cp312/lib/python3.12/site-packages/numpy/_core/include",
+)
+"""Folders of Python and NumPy where the wheels were built, which their CMake files have."""
+PATHS = "import numpy, sysconfig; print(sysconfig.get_paths()['include'], numpy.get_include())"
+BUILD_S = 900.0
 INSTALL_S = 900.0
+JOINTS = [f"arm_{i}_joint" for i in range(7)]
+SETTLED_S = 0.3
+"""Time in which messages that were sent arrive [s]."""
+STATE = "sensor_msgs/msg/JointState"
 
 
 @cache
@@ -60,7 +72,38 @@ def _install(python: str, folder: Path) -> None:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=INSTALL_S)
         if done.returncode:
             pytest.skip(f"ROS 2 cannot be installed: {done.stderr.strip().splitlines()[-1]}")
+    command = [f"{folder}/bin/python", "-c", PATHS]
+    include = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    for path in folder.glob("share/*/cmake/*.cmake"):
+        text = path.read_text()
+        if BUILT_WITH[0] in text:
+            for before, after in zip(BUILT_WITH, include.split()):
+                text = text.replace(before, after)
+            path.write_text(text)
     (folder / "ready").touch()
+
+
+def built(*packages: Path) -> Path:
+    """Builds packages of messages for ROS 2, once for each content. Returns the folder that they are installed in."""
+    folder = ros2_folder()
+    texts = b"".join(path.read_bytes() for each in packages for path in sorted(each.rglob("*")) if path.is_file())
+    prefix = folder.with_name(f"{folder.name}-{hashlib.sha256(texts).hexdigest()[:12]}")
+    paths = f"{prefix}:{folder}"
+    environment = {"PATH": f"{folder}/bin:/usr/bin:/bin", "AMENT_PREFIX_PATH": paths, "CMAKE_PREFIX_PATH": paths}
+    with open(f"{prefix}.lock", "w") as lock, tempfile.TemporaryDirectory() as build:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        for package in () if (prefix / "ready").exists() else packages:
+            make = ["cmake", "-S", str(package), "-B", f"{build}/{package.name}", f"-DCMAKE_INSTALL_PREFIX={prefix}"]
+            make += [
+                f"-DPython3_EXECUTABLE={folder}/bin/python",
+                "-DPython3_FIND_VIRTUALENV=ONLY",
+                "-DBUILD_TESTING=OFF",
+            ]
+            for command in (make, ["cmake", "--build", f"{build}/{package.name}", "--target", "install"]):
+                done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=BUILD_S)
+                assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+        (prefix / "ready").touch()
+    return prefix
 
 
 class Ros2:
@@ -118,3 +161,16 @@ class Ros2Peer:
             return answer
 
         return call
+
+
+def connect(peer: Ros2Peer, topic: str, publisher: rospy.Publisher, message: Any) -> int:
+    """Sends a message until a reader of ROS 2 gets it; returns how many the reader has got."""
+    wait_until(publisher.get_num_connections, f"{topic} is carried")
+
+    def is_heard() -> bool:
+        publisher.publish(message)
+        return bool(peer.count(topic))
+
+    wait_until(is_heard, f"{topic} is heard")
+    time.sleep(SETTLED_S)
+    return int(peer.count(topic))

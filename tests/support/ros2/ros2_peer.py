@@ -61,7 +61,7 @@ class Peer(Node):
         self._arrivals: dict[str, list[float]] = {}
         self._readers: dict[str, Any] = {}
         self._writers: dict[str, Any] = {}
-        self._clients: dict[str, Any] = {}
+        self._called: dict[str, Any] = {}
 
     def listen(
         self, topic: str, type_name: str, depth: int = 10, best_effort: bool = False, keeps: bool = False
@@ -97,6 +97,9 @@ class Peer(Node):
 
     def messages(self, topic: str) -> list[Any]:
         return [plain(each) for each in list(self._messages[topic])]
+
+    def last(self, topic: str) -> Any:
+        return plain(self._messages[topic][-1])
 
     def serialized(self, topic: str) -> list[bytes]:
         return [bytes(serialize_message(each)) for each in list(self._messages[topic])]
@@ -136,9 +139,9 @@ class Peer(Node):
 
     def call(self, service: str, type_name: str, values: dict[str, Any], timeout_s: float = 60.0) -> Any:
         """Calls a service."""
-        if service not in self._clients:
-            self._clients[service] = self.create_client(class_of(type_name), service)
-        client = self._clients[service]
+        if service not in self._called:
+            self._called[service] = self.create_client(class_of(type_name), service)
+        client = self._called[service]
         assert client.wait_for_service(timeout_s), f"no service {service}"
         return plain(_result(client.call_async(filled(class_of(type_name).Request(), values)), timeout_s))
 

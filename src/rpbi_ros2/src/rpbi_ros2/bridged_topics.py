@@ -80,10 +80,9 @@ class BridgedTopics:
             if name not in self._incoming:
                 reader = self._participant.reader(self._config.ros2_name(name), kind.ros2_type)
                 self._incoming[name] = IncomingTopic(name, kind, reader)
-        refused = {name: kind for name, kind in self._kinds.items() if isinstance(kind, str) and name not in known}
+        refused = {kind for name, kind in self._kinds.items() if isinstance(kind, str) and name not in known}
         if refused:
-            reasons = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
-            rospy.loginfo(f"types that are not connected with ROS 2: {reasons}")
+            rospy.loginfo(f"not connected with ROS 2: {'; '.join(sorted(refused))}")
         self._report_collisions()
 
     def describe(self) -> None:

@@ -34,7 +34,7 @@ BRIDGE = b"rpbi_ros2 "
 PREFIX = "rt"
 """Beginning of the names of topics of ROS 2 in DDS."""
 DEPTH, LARGE_DEPTH = 1000, 30
-"""Messages that are kept for a reader that does not keep up; 1 s at 1 kHz; and of messages with blocks of bytes, 1 s at 30 Hz."""
+"""Messages that are kept for a slow reader: 1 s at 1 kHz, and of messages with blocks of bytes 1 s at 30 Hz."""
 BLOCKING_S = 0.0
 """Longest time for which a writer waits for readers [s]."""
 MAX_TAKEN = 256
@@ -59,8 +59,7 @@ CONFIG = """\
   </Internal>
   <Tracing><Verbosity>none</Verbosity></Tracing>
 </Domain></CycloneDDS>"""
-"""Configuration of Cyclone DDS. Bursts are shorter than the usual buffer of a socket, 208 KiB: a reader that loses a part
-of an image has to ask for it."""
+"""Configuration of Cyclone DDS. Bursts fit into the usual buffer of a socket, 208 KiB; readers ask for the rest."""
 
 
 class Bridge(NamedTuple):

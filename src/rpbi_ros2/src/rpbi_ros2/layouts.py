@@ -115,7 +115,7 @@ def _converted(source: MessageType, packages: frozenset[str]) -> Ros2Type:
     name = RENAMED_TYPES.get(source.name, source.name)
     package = name.partition("/")[0]
     if package not in COMMON_PACKAGES | packages:
-        raise RefusedTypeError(f"package {package} is not known in ROS 2")
+        raise RefusedTypeError(f"{name}: package {package} is not known in ROS 2")
     if name in DIFFERENT_TYPES:
         raise RefusedTypeError(f"{name} has other fields in ROS 2")
     fields = []

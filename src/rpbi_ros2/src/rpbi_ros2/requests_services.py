@@ -185,7 +185,7 @@ CALLS: dict[str, Callable[..., Answer]] = {
     "spawn": _spawn,
     "move": _move,
     "remove": lambda name: _success(remove(name)),
-    "save": lambda file: _success(save(Path(file))),
-    "restore": lambda file: _success(restore(Path(file))),
+    "save": lambda file: _success(save(Path.home() / file)),
+    "restore": lambda file: _success(restore(Path.home() / file)),
 }
 """Functions that requests call, by name."""
