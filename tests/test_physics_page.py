@@ -40,7 +40,7 @@ def test_undamped_motions_match_their_closed_forms():
     assert all(ratio == pytest.approx(1.0, abs=0.005) for figure, ratio in ratios.items() if "damping 0" in figure)
     assert sum("damping 0" in figure for figure in ratios) == 12
     assert ratios["turning: rolling, `rollingFriction: 0.01` [m/s^2], maximal"] == pytest.approx(1.0, rel=1e-3)
-    assert ratios["falling: damping not given, default, 1 ms"] < 0.95
+    assert ratios["falling: damping not given, default, time step 1 ms"] < 0.95
 
 
 def test_table_without_a_place_is_reported_by_name():

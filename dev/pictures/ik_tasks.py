@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-import numpy as np
 from plots import GOOD, empty_figure, legend_below, save, show
 from render import Photographer
 
@@ -32,10 +31,9 @@ def draw_ik_talos(path: Path) -> None:
     balance = cast(ComInSupport, solver.tasks.parts["balance"].task)
     robot = solver.tasks.robot
     world, camera = World.from_file(WORLD), Photographer(CAMERA, MIDDLE, FOV_DEG, SIZE_PX)
-    figure = empty_figure((11.0, 6.2))
-    scenes, plots = figure.subfigures(2, 1, height_ratios=(2.6, 1.0))
-    supports = plots.subplots(1, len(TARGETS), sharey=True)
-    for target, scene, support in zip(TARGETS, scenes.subplots(1, len(TARGETS)), supports):
+    figure = empty_figure((11.0, 6.6))
+    scenes, supports = figure.subplots(2, len(TARGETS), height_ratios=(2.6, 1.0))
+    for target, scene, support in zip(TARGETS, scenes, supports):
         solution = solver.solve(IKProblem(target=Pose(target)))
         assert solution.base_pose is not None
         world.act("talos", "teleport", solution.base_pose)
@@ -52,6 +50,6 @@ def draw_ik_talos(path: Path) -> None:
         support.plot(centre[1], centre[0], "o", color=GOOD, label="centre of mass")
         support.set(xlabel="y, to the left [m]", xlim=(0.2, -0.2), ylim=(-0.15, 0.15), aspect="equal")
     supports[0].set_ylabel("x, forward [m]")
-    legend_below(plots, supports[0], 2)
+    legend_below(figure, supports[0], 2)
     world.close()
     save(figure, path)

@@ -46,6 +46,8 @@ RESTS_S = 3.0
 """Time after which the arm rests on the box [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
+CAMERA_YAW_RAD = -0.8
+"""Direction of the camera as seen from the avatar [rad]."""
 BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 """Frames of the ball that a person moves, and of the arm's tip, which follows it."""
 
@@ -204,16 +206,22 @@ def avatar_walking(path: Path) -> None:
     """Draws the avatar in a stride, and while it reaches forward."""
     with Stage(560, 520) as stage:
         stage.launch("avatar.launch")
-        frames = Frames("rpbi/human/Pelvis")
+        frames, world = Frames("rpbi/human/Pelvis"), Frames("rpbi/world")
         frames.wait_for("rpbi/human/RightHand")
-        view = Orbit(2.9, (0.1, 0.0, -0.05), 0.2, -0.8)
+        view = Orbit(2.9, (0.1, 0.0, -0.05), 0.2, CAMERA_YAW_RAD)
         stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
 
         def part(name: str) -> Array:
             return frames.wait_for(f"rpbi/human/{name}")
 
+        def shows_right_side() -> bool:
+            """Returns whether the right side of the avatar points to the camera."""
+            right, left = (world.wait_for(f"rpbi/human/{side}UpperArm") for side in ("Right", "Left"))
+            x, y, _ = (right - left) / np.linalg.norm(right - left)
+            return bool(x * np.cos(CAMERA_YAW_RAD) + y * np.sin(CAMERA_YAW_RAD) > 0.9)
+
         def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
-            stop_when(stage, condition)
+            stop_when(stage, lambda: shows_right_side() and condition())
             picture = stage.still_picture()
             call("rpbi/start")
             return with_caption(picture, meaning)

@@ -33,9 +33,9 @@ def resting() -> Table:
                 run(world, 2.0)
                 depths.append(1000.0 * (HALF_M - height(world, "box")))
                 forces.append(floor_force(world, 0.5))
-    names = tuple(f"{1000 * step:.3g} ms, {kind}" for step in steps_s for kind in KINDS)
-    rows = [("depth [mm]", (*depths, 0.0)), ("force [N]", (*forces, GRAVITY))]
-    return Table(("box of 1 kg", *names, CLOSED_FORM), rows)
+    names = tuple(f"time step {1000 * step:.3g} ms, {kind}" for step in steps_s for kind in KINDS)
+    rows = [("penetration depth [mm]", (*depths, 0.0)), ("force on the floor [N]", (*forces, GRAVITY))]
+    return Table(("quantity", *names, CLOSED_FORM), rows)
 
 
 def stiffness() -> Table:
@@ -56,8 +56,8 @@ def stiffness() -> Table:
                         found.append(1000.0 * (HALF_M - height(world, "it")))
             closed = 1000.0 * GRAVITY / (contacts * value)
             rows.append((f"{name}, `contactStiffness: {value:.1e}`", (*found, closed)))
-    names = tuple(f"{step}, {kind}" for step in ("2 ms", "1 ms") for kind in KINDS)
-    return Table(("depth [mm]", *names, CLOSED_FORM), rows)
+    names = tuple(f"time step {step}, {kind}" for step in ("2 ms", "1 ms") for kind in KINDS)
+    return Table(("penetration depth [mm]", *names, CLOSED_FORM), rows)
 
 
 def stacking() -> Table:
@@ -71,20 +71,23 @@ def stacking() -> Table:
                     run(world, 5.0)
                     x, y, z = world.bodies["box9"].base_pose().position
                 cells += [1000.0 * (19 * HALF_M - z), 1000.0 * (x * x + y * y) ** 0.5]
-            name = f"{1000 * time_step_s:.3g} ms, `numSolverIterations: {iterations}`"
+            name = f"time step {1000 * time_step_s:.3g} ms, `numSolverIterations: {iterations}`"
             rows.append((name, tuple(cells)))
-    names = tuple(f"{what}, {kind} [mm]" for kind in KINDS for what in ("top sinks", "top leans"))
-    return Table(("ten boxes", *names), rows)
+    names = tuple(f"{what} of the top box [mm], {kind}" for kind in KINDS for what in ("sinking", "lateral shift"))
+    return Table(("setting", *names), rows)
 
 
 def loading() -> Table:
-    """Penetration of a light box of 1 kg under a heavy one in the floor, after 3 s."""
+    """Penetration of a light box of 1 kg under a heavy one in the floor, after 2 s."""
     rows = []
     settings: dict[str, tuple[float, dict[str, Any]]] = {
-        "1 ms": (0.001, {}),
-        "1 ms, `numSolverIterations: 500`": (0.001, {"numSolverIterations": 500, "solverResidualThreshold": 0.0}),
-        "0.25 ms": (0.00025, {}),
-        "1 ms, `numSubSteps: 4`": (0.001, {"numSubSteps": 4}),
+        "time step 1 ms": (0.001, {}),
+        "time step 1 ms, `numSolverIterations: 500`": (
+            0.001,
+            {"numSolverIterations": 500, "solverResidualThreshold": 0.0},
+        ),
+        "time step 0.25 ms": (0.00025, {}),
+        "time step 1 ms, `numSubSteps: 4`": (0.001, {"numSubSteps": 4}),
     }
     for name, (time_step_s, engine) in settings.items():
         found = []
@@ -93,7 +96,7 @@ def loading() -> Table:
                 run(world, 2.0)
                 found.append(1000.0 * (HALF_M - height(world, "box0")))
         rows.append((name, tuple(found)))
-    return Table(("depth of the light one [mm]", "10 kg on it", "100 kg on it", "1000 kg on it"), rows)
+    return Table(("penetration depth of the light box [mm]", "under 10 kg", "under 100 kg", "under 1000 kg"), rows)
 
 
 def _stack(masses: list[float], time_step_s: float, engine: dict[str, Any], keys: dict[str, Any]) -> Any:

@@ -47,7 +47,7 @@ def tumbling() -> Table:
                 run(world, 10.0)
                 found.append(_spinning(world) / at_start)
         rows.append((kind, (*found, 1.0)))
-    return Table(("energy kept in 10 s of tumbling", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
+    return Table(("energy after 10 s / initial energy", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def _spinning(world: World) -> float:
@@ -63,9 +63,9 @@ def cradling() -> Table:
     rows: list[tuple[str, tuple[Cell, ...]]] = []
     for name, engine in ENGINES.items():
         columns = [_cradle_energies(time_step_s, engine) for time_step_s in TIME_STEPS_S]
-        for after, found in zip(("1 s", "10 s"), zip(*columns)):
+        for after, found in zip(("after 1 s", "after 10 s"), zip(*columns)):
             rows.append((f"{name}, {after}", (*found, 1.0)))
-    return Table(("energy of a cradle over that at its start", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
+    return Table(("energy / initial energy", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def _cradle_energies(time_step_s: float, engine: dict[str, float]) -> tuple[float, float]:

@@ -29,23 +29,31 @@ HALF_M = (0.05, 0.05, 0.02)
 DIRECTIONS_DEG = (0, 15, 30, 45, 60, 90)
 YAWS_DEG = (0, 15, 30, 45)
 SETTINGS: dict[str, dict[str, Any]] = {
-    "default, plane": {"floor": plane_floor},
+    "default; the floor is a `GEOM_PLANE`": {"floor": plane_floor},
     "default": {},
     "`numSolverIterations: 500`": {"engine": {"numSolverIterations": 500, "solverResidualThreshold": 0.0}},
     "`numSubSteps: 4`": {"engine": {"numSubSteps": 4}},
     "`enableConeFriction: false`": {"engine": {"enableConeFriction": False}},
     "`CONSTRAINT_SOLVER_LCP_PGS`": {"engine": {"constraintSolverType": "CONSTRAINT_SOLVER_LCP_PGS"}},
     "`CONSTRAINT_SOLVER_LCP_DANTZIG`": {"engine": {"constraintSolverType": "CONSTRAINT_SOLVER_LCP_DANTZIG"}},
-    "only the box has `useMaximalCoordinates`": {"box_keys": MAXIMAL},
-    "both have, plane": {"floor": plane_floor, "floor_keys": MAXIMAL, "box_keys": MAXIMAL},
-    "both have, floor put there by TF": {"floor": floor_of_tf, "floor_keys": MAXIMAL, "box_keys": MAXIMAL},
-    "the same, `contactBreakingThreshold: 0.1`": {
+    "only the box has the key `useMaximalCoordinates`": {"box_keys": MAXIMAL},
+    "both bodies have the key; the floor is a `GEOM_PLANE`": {
+        "floor": plane_floor,
+        "floor_keys": MAXIMAL,
+        "box_keys": MAXIMAL,
+    },
+    "both bodies have the key; TF places the floor": {
+        "floor": floor_of_tf,
+        "floor_keys": MAXIMAL,
+        "box_keys": MAXIMAL,
+    },
+    "both bodies have the key; TF places the floor; `contactBreakingThreshold: 0.1`": {
         "floor": floor_of_tf,
         "floor_keys": MAXIMAL,
         "box_keys": MAXIMAL,
         "engine": {"contactBreakingThreshold": 0.1},
     },
-    "**both have `useMaximalCoordinates`**": {"floor_keys": MAXIMAL, "box_keys": MAXIMAL},
+    "**both bodies have the key `useMaximalCoordinates`**": {"floor_keys": MAXIMAL, "box_keys": MAXIMAL},
 }
 
 
@@ -99,8 +107,8 @@ def sliding() -> Table:
                 found = slide(direction, yaw, speed_m_s=0.5, **keys)
                 cells.append(f"{found.force:.3f}, {abs(found.off_deg):.1f}")
         rows.append((f"{direction} deg", tuple(cells)))
-    default = (f"default, yaw {yaw}" for yaw in YAWS_DEG)
-    return Table(("direction", *default, *(f"maximal, yaw {yaw}" for yaw in YAWS_DEG)), rows)
+    names = (f"{kind}, yaw {yaw} deg" for kind in ("default", "maximal") for yaw in YAWS_DEG)
+    return Table(("direction of motion", *names), rows)
 
 
 def sliding_by_setting() -> Table:
@@ -118,7 +126,8 @@ def sliding_by_setting() -> Table:
             cells += [Span(min(forces), max(forces)), round(max(abs(each.off_deg) for each in found), 1)]
         rows.append((name, tuple(cells)))
     names = ("1 kHz, 0.5 m/s", "1 kHz, 2 m/s", "500 Hz, 2 m/s")
-    return Table(("", *(f"{what}, {name}" for name in names for what in ("force", "off [deg]"))), rows)
+    measured = ("friction / (mu m g)", "direction error [deg]")
+    return Table(("setting", *(f"{what}, {name}" for name in names for what in measured)), rows)
 
 
 KINDS = {"default": {}, "maximal": MAXIMAL}
@@ -130,8 +139,8 @@ def slope() -> Table:
     rows = []
     for direction, yaw in ((0, 0), (0, 45), (45, 0), (30, 15)):
         found = [_angle_of_slip(direction, yaw, keys) for keys in KINDS.values()]
-        rows.append((f"down {direction} deg, yaw {yaw} deg", (*found, closed)))
-    return Table(("angle of slip [deg]", *KINDS, CLOSED_FORM), rows)
+        rows.append((f"slope direction {direction} deg, yaw {yaw} deg", (*found, closed)))
+    return Table(("slip angle [deg]", *KINDS, CLOSED_FORM), rows)
 
 
 def _angle_of_slip(direction_deg: float, yaw_deg: float, keys: dict[str, Any]) -> float:
@@ -172,8 +181,8 @@ def creep() -> Table:
         angle = math.degrees(math.atan(share * FRICTION))
         for time_step_s in (0.001, 0.002, 0.004):
             found = [1000.0 * _speed_on_slope(angle, 30.0, 15.0, keys, 3.0, time_step_s) for keys in KINDS.values()]
-            rows.append((f"{share:.0%} of friction, {1000 * time_step_s:g} ms", (*found, 0.0)))
-    return Table(("creep [mm/s]", *KINDS, CLOSED_FORM), rows)
+            rows.append((f"load {share:.0%}, time step {1000 * time_step_s:g} ms", (*found, 0.0)))
+    return Table(("creep speed [mm/s]", *KINDS, CLOSED_FORM), rows)
 
 
 def turning() -> Table:
@@ -194,7 +203,7 @@ def turning() -> Table:
             lambda world: (30.0 - velocity(world, "ball")[1][2]) / 0.5,
             spinning,
         ),
-        "spinning, with `rollingFriction: 1.0e-6` [rad/s^2]": (
+        "spinning, `spinningFriction: 0.01`, `rollingFriction: 1.0e-6` [rad/s^2]": (
             {"spinningFriction": coefficient, "rollingFriction": 1e-6},
             {"angularVelocity": [0.0, 0.0, 30.0]},
             lambda world: (30.0 - velocity(world, "ball")[1][2]) / 0.5,

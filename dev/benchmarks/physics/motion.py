@@ -53,7 +53,7 @@ def falling() -> Table:
                     run(world, 1.0)
                     found.append(100.0 - height(world, "ball"))
             rows.append((f"{name}, {kind}", (*found, GRAVITY / 2)))
-    return Table(("fallen in 1 s [m]", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
+    return Table(("distance fallen in 1 s [m]", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def swinging() -> Table:
@@ -82,9 +82,9 @@ def swinging() -> Table:
                     periods.append((crossings[20] - crossings[0]) / 10)
     rows = [
         ("period [s], damping 0", (*periods, closed_s)),
-        *((f"energy kept over 10 periods, {name}", (*found, 1.0)) for name, found in kept.items()),
+        *((f"energy after 10 periods / initial energy, {name}", (*found, 1.0)) for name, found in kept.items()),
     ]
-    return Table(("pendulum", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
+    return Table(("quantity", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def _energy_at_bottom(world: World, crossings: list[float]) -> float:
@@ -96,6 +96,7 @@ def _energy_at_bottom(world: World, crossings: list[float]) -> float:
 
 UNTHROWN = {"useSplitImpulse": True, "splitImpulsePenetrationThreshold": 0.0}
 """Penetration is mended without making things faster, but only in maximal coordinates."""
+REBOUND = "rebound height / exact rebound height"
 REBOUNDS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "default": ({}, {}),
     "`numSubSteps: 4`": ({}, {"numSubSteps": 4}),
@@ -115,12 +116,12 @@ def bouncing() -> Table:
             found = [rebound(restitution, 1.0 + 0.0041 * index, keys, engine, floor) for index in range(5)]
             cells.append(Span(min(found), max(found)))
         rows.append((name, tuple(cells)))
-    return Table(("rebound over closed form", *(f"`restitution: {each}`" for each in (0.5, 0.8, 1.0))), rows)
+    return Table((REBOUND, *(f"`restitution: {each}`" for each in (0.5, 0.8, 1.0))), rows)
 
 
 FLOORS: dict[str, Callable[..., dict[str, Any]]] = {
-    "box by `collisionFramePosition`": box_floor,
-    "box by `basePosition`": lambda **keys: floor_of_tf(basePosition=[0.0, 0.0, -0.5], object_tf=None, **keys),
+    "box moved by `collisionFramePosition`": box_floor,
+    "box placed by `basePosition`": lambda **keys: floor_of_tf(basePosition=[0.0, 0.0, -0.5], object_tf=None, **keys),
     "`GEOM_PLANE`": plane_floor,
 }
 
@@ -134,7 +135,7 @@ def bouncing_by_floor() -> Table:
             found = [rebound(1.0, 1.0 + 0.0005 * index, keys, engine, floor(**keys)) for index in range(10)]
             cells.append(Span(min(found), max(found)))
         rows.append((name, tuple(cells)))
-    return Table(("rebound over closed form", *FLOORS), rows)
+    return Table((REBOUND, *FLOORS), rows)
 
 
 def rebound(
@@ -153,7 +154,7 @@ def rebound(
 
 def step_name(time_step_s: float) -> str:
     """Returns a time step as the head of a column."""
-    return f"{1000 * time_step_s:.3g} ms"
+    return f"time step {1000 * time_step_s:.3g} ms"
 
 
 def _arithmetic_geometric_mean(a: float, b: float) -> float:

@@ -11,10 +11,12 @@ from typing import Any
 from custom_ros_tools.errors import PhysicsError
 
 from .contact import floor_force
+from .motion import step_name
 from .scene import CLOSED_FORM, GRAVITY, Cell, Table, box_floor, run, scene
 
 EDGE_M = 0.2
 MASS_KG = 2.0
+TIME_STEPS_S = (0.032, 0.016, 0.008, 0.004)
 
 
 def weighing() -> Table:
@@ -22,10 +24,10 @@ def weighing() -> Table:
     rows = []
     for pascals in (4e3, 4e5):
         cells: list[Cell] = []
-        for time_step_s in (0.032, 0.016, 0.008, 0.004):
+        for time_step_s in TIME_STEPS_S:
             cells.append(_weight(time_step_s, pascals))
         rows.append((f"`NeoHookeanMu: {pascals:.1e}`", (*cells, MASS_KG * GRAVITY)))
-    return Table(("force on the floor [N]", "32 ms", "16 ms", "8 ms", "4 ms", CLOSED_FORM), rows)
+    return Table(("force on the floor [N]", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def _weight(time_step_s: float, pascals: float) -> float | str:

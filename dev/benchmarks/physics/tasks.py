@@ -81,13 +81,21 @@ def _move(world: World, robot: str, seconds: float, target: Callable[[float], di
 FIRM = {"contactStiffness": 10_000.0, "contactDamping": 200.0}
 """Contacts that share a load, since none is stiffer than the others."""
 GRASPS: dict[str, tuple[float, dict[str, Any], dict[str, Any]]] = {
-    "1 ms": (0.001, {}, {}),
-    "1 ms, `numSolverIterations: 200`": (0.001, {"numSolverIterations": 200, "solverResidualThreshold": 0.0}, {}),
-    "1 ms, `frictionAnchor: true`": (0.001, {}, {"frictionAnchor": True}),
-    "1 ms, `spinningFriction: 0.01`": (0.001, {}, {"spinningFriction": 0.01, "rollingFriction": 1e-6}),
-    "**1 ms, `contactStiffness: 1.0e+4`, `contactDamping: 200`**": (0.001, {}, FIRM),
-    "2 ms, the same": (0.002, {}, FIRM),
-    "4.17 ms, the same": (1 / 240, {}, FIRM),
+    "time step 1 ms": (0.001, {}, {}),
+    "time step 1 ms, `numSolverIterations: 200`": (
+        0.001,
+        {"numSolverIterations": 200, "solverResidualThreshold": 0.0},
+        {},
+    ),
+    "time step 1 ms, `frictionAnchor: true`": (0.001, {}, {"frictionAnchor": True}),
+    "time step 1 ms, `spinningFriction: 0.01`, `rollingFriction: 1.0e-6`": (
+        0.001,
+        {},
+        {"spinningFriction": 0.01, "rollingFriction": 1e-6},
+    ),
+    "**time step 1 ms, `contactStiffness: 1.0e+4`, `contactDamping: 200`**": (0.001, {}, FIRM),
+    "time step 2 ms, the same contact keys": (0.002, {}, FIRM),
+    "time step 4.17 ms, the same contact keys": (1 / 240, {}, FIRM),
 }
 
 
@@ -99,8 +107,8 @@ def grasping() -> Table:
         for keys in KINDS.values():
             cells += _grasp(time_step_s, engine, dynamics, keys)
         rows.append((name, tuple(cells)))
-    names = (f"{what}, {kind}" for kind in KINDS for what in ("slips [mm]", "turns [deg]"))
-    return Table(("grasp, 3 s", *names), rows)
+    names = (f"{what}, {kind}" for kind in KINDS for what in ("slip [mm]", "rotation [deg]"))
+    return Table(("setting", *names), rows)
 
 
 def _grasp(
@@ -148,14 +156,15 @@ def pushing() -> Table:
             forces = [each.force for each in samples if isinstance(each, ContactsSample)][1000:]
             force = -sum(x * each[0] + y * each[1] for each in forces) / len(forces) / (FRICTION * GRAVITY)
             cells += [force, 1000.0 * abs(x * at[1] - y * at[0]), abs(math.degrees(turned))]
-        rows.append((f"along {degrees:g} deg", tuple(cells)))
-    names = (f"{what}, {kind}" for kind in KINDS for what in ("force over mu m g", "astray [mm]", "turns [deg]"))
-    return Table(("push, 0.3 m", *names), rows)
+        rows.append((f"{degrees:g} deg", tuple(cells)))
+    measured = ("push force / (mu m g)", "lateral deviation [mm]", "rotation [deg]")
+    return Table(("direction of the push", *(f"{what}, {kind}" for kind in KINDS for what in measured)), rows)
 
 
 MANY = {"numSolverIterations": 500, "solverResidualThreshold": 0.0}
+PREDICTED = "direction error predicted from the effective masses [deg]"
 WIPES: dict[str, tuple[dict[str, Any], dict[str, Any] | None]] = {
-    "tip on table": ({}, None),
+    "tip on the table": ({}, None),
     "pad": ({}, FIRM),
     "pad, 500 iterations": (MANY, FIRM),
 }
@@ -170,9 +179,9 @@ def wiping() -> Table:
         for engine, pad in WIPES.values():
             cells += _wipe(x, y, engine, pad)
         by_masses = abs(math.degrees(math.atan2(2.0 * y, 6.0 * x)) - degrees)
-        rows.append((f"along {degrees:g} deg", (*cells, by_masses)))
-    names = (f"{what}, {how}" for how in WIPES for what in ("force", "off [deg]"))
-    return Table(("wipe", *names, "off by the masses [deg]"), rows)
+        rows.append((f"{degrees:g} deg", (*cells, by_masses)))
+    names = (f"{what}, {how}" for how in WIPES for what in ("friction / (mu N)", "direction error [deg]"))
+    return Table(("direction of motion", *names, PREDICTED), rows)
 
 
 def _wipe(x: float, y: float, engine: dict[str, Any], pad: dict[str, Any] | None) -> tuple[float, float]:

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 CHECK = """
 import sys
 import warnings
@@ -26,6 +28,7 @@ env.close()
 """
 
 
+@pytest.mark.thorough
 def test_it_opens_and_closes(screen, tmp_path):
     command = [sys.executable, "-c", CHECK, str(tmp_path)]
     environment = {**os.environ, **screen.environment, "PYTHONPATH": os.pathsep.join(sys.path)}

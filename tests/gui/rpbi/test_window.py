@@ -68,6 +68,7 @@ def test_window_has_its_configured_view_and_content(ros, screen, start):
     assert np.abs(edges - 255 * np.array(BACKGROUND)).max() < 3  # no panels there
 
 
+@pytest.mark.thorough
 def test_node_with_a_window_publishes_and_ends_on_interrupt(ros, screen, start):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     images = ros.listen("/rpbi/camera/colour/image", Image)

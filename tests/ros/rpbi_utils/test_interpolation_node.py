@@ -50,6 +50,7 @@ class Motion:
 
     def __init__(self, ros: RosSystem) -> None:
         self._targets = ros.listen("joint_states/target", JointState)
+        wait_until(lambda: self._targets.is_connected, "the node sends its targets to us")
 
     def __call__(self) -> list[JointState]:
         return list(self._targets.messages)

@@ -64,6 +64,7 @@ def vector(message: WrenchStamped) -> np.ndarray:
     return np.array([getattr(part, axis) for part in (message.wrench.force, message.wrench.torque) for axis in "xyz"])
 
 
+@pytest.mark.thorough
 def test_payload_is_identified_and_its_weight_subtracted_in_every_pose(node):
     read, payload = node.listen("calibrated", WrenchStamped), node.listen("wrench/payload", InertiaStamped)
     rosout = Rosout(node)

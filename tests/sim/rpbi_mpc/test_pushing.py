@@ -64,6 +64,7 @@ def test_ipopt_alone_does_it_too():
     assert trial.errors.mean() < 0.005 and all(cycle.status == "solved" for cycle in trial.cycles)
 
 
+@pytest.mark.thorough
 def test_sampled_pushes_follow_a_line_as_predicted():
     config = PushingConfig(path=LINE)
     sampling = PushSamplingConfig(horizon=0.6, seed=903)

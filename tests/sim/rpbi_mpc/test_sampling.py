@@ -39,6 +39,7 @@ def run(world: World, cost: str = "costs:turned", delay_s: float = 0.01) -> Lock
     return loop
 
 
+@pytest.mark.thorough
 def test_arm_reaches_the_least_cost_reproducibly(world):
     loop = run(world)
     assert list(world.bodies["iiwa"].joint_positions().values())[1] == pytest.approx(0.6, abs=0.06)

@@ -67,6 +67,7 @@ def test_renderer_crash_stops_the_world_and_a_start_continues(ros, placed):
     assert set(np.diff(after)) == {DT_NS}
 
 
+@pytest.mark.thorough
 def test_world_stops_and_names_the_missing_frame_of_its_camera(ros):
     ros.listen(DEPTH, Image)
     simulator = ros.simulator(box_world(ros, rgbd_sensor=SYNCHRONOUS), use_sim_time=True)

@@ -222,6 +222,7 @@ def test_resets_at_once_from_many_are_all_served(ros, start):
     assert done == [True] * 8
 
 
+@pytest.mark.thorough
 def test_a_hundred_resets_leave_no_trace(ros, start, tmp_path):
     """With a TF listener, a recorder and a controller attached."""
     process = start(True)

@@ -132,6 +132,7 @@ def test_recorder_paused_for_a_while_misses_nothing(ros: Any, tmp_path: Path) ->
     assert list(bag_to_dataframes(tmp_path / "a.bag")["/burst"]["data"]) == list(numbers)
 
 
+@pytest.mark.thorough
 def test_recorder_paused_for_long_loses_no_messages(ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a slow disk: at the end its process answers nothing for longer than the usual grace."""
     monkeypatch.setattr(recorder_module, "_MOST_GRACE_S", 0.2)

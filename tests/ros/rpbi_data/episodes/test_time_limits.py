@@ -40,11 +40,13 @@ def slow(tmp_path_factory: pytest.TempPathFactory) -> EpisodeFolder:
     return folder
 
 
+@pytest.mark.thorough
 def test_verify_ends_an_episode_with_slow_ticks(slow, run) -> None:
     code, text = run("verify", slow.path, "--max-cpu", 1)
     assert code == 1 and text == f"episode 0: {TOO_SLOW}\n0 of 1 episodes are the same\n"
 
 
+@pytest.mark.thorough
 def test_view_ends_a_page_that_takes_long(slow, run, monkeypatch, tmp_path: Path) -> None:
     def spin(*_, **__):
         while True:

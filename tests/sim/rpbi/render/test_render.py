@@ -597,3 +597,15 @@ def test_renderer_ends_when_the_simulator_is_killed(tmp_path):
     assert (tmp_path / "closed").exists()
     with pytest.raises(OSError):
         os.readlink(f"/proc/{renderer}/exe")
+
+
+def test_a_renderer_that_still_starts_is_killed_at_once(tmp_path, monkeypatch):
+    """It reads no messages until its meshes are loaded, and an interrupted simulator must not wait for them."""
+    monkeypatch.setattr("rpbi.render.client.STOP_TIMEOUT_S", float("inf"))
+    rendering = Rendering(tmp_path, make_world(tmp_path))
+    monkeypatch.setattr(rendering.client, "_command", [sys.executable, "-c", "import time; time.sleep(600.0)"])
+    rendering.client.poll()
+    process_id = rendering.client.process_id
+    assert not rendering.client.stop()
+    assert not Path(f"/proc/{process_id}").exists()
+    rendering.world.close()

@@ -34,7 +34,8 @@ log = logging.getLogger(__name__)
 
 LONGEST_PAUSE_S = 30.0
 STABLE_AFTER_S = 10.0
-STOP_TIMEOUT_S = 5.0
+STOP_TIMEOUT_S = 2.0
+"""Longest wait [s] for the end of a renderer that is ready; a renderer that still starts does not listen."""
 SILENT_AFTER_S = 5.0
 """Longest time [s] without a message from a renderer that is ready; beyond it, a warning is logged."""
 
@@ -184,7 +185,7 @@ class RenderClient:
                 scenes[camera] = scene._replace(sample=scene.sample._replace(bodies=bodies))
 
     def stop(self) -> bool:
-        """Ends the process, and kills the process if it does not end within STOP_TIMEOUT_S.
+        """Ends the process; kills it if it is still starting, or does not end within STOP_TIMEOUT_S.
 
         Returns:
             False if the process was killed.
@@ -195,7 +196,7 @@ class RenderClient:
             self._channel = None
         if self._process is not None:
             try:
-                self._process.wait(STOP_TIMEOUT_S)
+                self._process.wait(STOP_TIMEOUT_S if self.renderer else 0.0)
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
