@@ -240,6 +240,33 @@ def test_port_in_use_ends_the_node_with_one_line(ros: RosSystem, link: str) -> N
     assert f"port {port}: Address already in use" in ros.output(node) and "Traceback" not in ros.output(node)
 
 
+def test_command_shows_the_running_world_until_it_is_interrupted(world: RosSystem) -> None:
+    command = world.start([RPBI, "view", "--port", "0"])
+    wait_until(lambda: "view: http" in world.output(command) or command.poll() is not None, "the link is printed")
+    found = re.search(r"view: (\S+)", world.output(command))
+    assert found is not None, world.output(command)
+    with Viewer(found[1]) as viewer:
+        viewer.wait(lambda: has(viewer, "/box/"))
+        os.killpg(command.pid, signal.SIGINT)
+        assert command.wait(60.0) == 0 and "Traceback" not in world.output(command)
+
+
+def test_hanging_simulator_does_not_stop_the_view(ros: RosSystem) -> None:
+    simulator = ros.simulator(box_world(ros), namespace="/hangs/")
+    _, link = start_view(ros, "__ns:=/hangs")
+    with Viewer(link) as viewer, publishing("hangs/goal", Marker) as publisher:
+        viewer.wait(lambda: viewer.offers("Object", "box"))
+        os.killpg(simulator.pid, signal.SIGSTOP)
+        try:
+            viewer.wait(lambda: viewer.value("World") == "no simulator")
+            marker = Marker(ns="goal", type=Marker.CUBE)
+            marker.header.frame_id, marker.color.a, marker.scale.x = "rpbi/world", 1.0, 1.0
+            publisher.publish(marker)
+            viewer.wait(lambda: has(viewer, "/goal/"))
+        finally:
+            os.killpg(simulator.pid, signal.SIGCONT)
+
+
 @pytest.mark.thorough
 def test_launch_shows_the_world_until_its_end(ros: RosSystem) -> None:
     world = ros.write_yaml("world.yaml", box_world(ros))

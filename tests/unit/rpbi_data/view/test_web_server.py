@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import http.client
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
@@ -197,6 +199,12 @@ def test_silent_connections_do_not_keep_others_out(server: WebServer) -> None:
     assert get(server.link).status == 200
     for each in silent:
         each.close()
+
+
+def test_missing_extra_is_named_with_its_command() -> None:
+    script = "import sys; sys.modules['viser'] = None; import rpbi_data.view.web_server"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stderr.splitlines()[-1].endswith("'viser' is not installed: ./rpbi setup html")
 
 
 def test_page_of_another_version_is_refused(server: WebServer, monkeypatch: pytest.MonkeyPatch) -> None:

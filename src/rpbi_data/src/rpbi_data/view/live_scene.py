@@ -21,7 +21,7 @@ STILL = 1e-5
 """Change of a coordinate [m] or a quaternion component above which a pose is sent."""
 MAX_TRIANGLES = 150_000
 """Number of triangles of bodies that appear together, above which their meshes are simplified."""
-FRUSTUM_M = 0.3
+FRUSTUM_M = 0.2
 """Height of the frustum of a camera [m]."""
 AXIS_M, AXIS_RADIUS_M = 0.12, 0.003
 """Length and radius of the axes of frames [m]."""

@@ -6,7 +6,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,6 +26,8 @@ FRAMES_HZ, REFRESH_HZ, IMAGES_HZ = 30.0, 4.0, 10.0
 """Rates of poses, of the fields of the panel, and of images, in wall time [Hz]."""
 IDLE_HZ = 2.0
 """Rate at which the scene is drawn while nobody looks, so that the next viewer sees it at once [Hz]."""
+LAST_CALL_S = 2.0
+"""Longest time to wait for the last call of a thread at the end [s]."""
 CAMERA_S = 1.0
 """Longest time to wait for the configuration of the world after the first shapes [s]."""
 
@@ -53,11 +55,39 @@ class ViewSource(Protocol):
         """Returns time [s] and pixels of the newest chosen image, and the name of its camera's item."""
 
 
+class _Loop:
+    """Calls a function at a fixed rate of wall time in a thread. An error is reported, and the thread continues."""
+
+    def __init__(self, name: str, hz: float, call: Callable[[], None]) -> None:
+        self._period_s, self._call, self._fault = 1.0 / hz, call, ""
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Ends the thread, and waits for its last call, but not without limit."""
+        self._ended.set()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(LAST_CALL_S)
+
+    def _run(self) -> None:
+        next_s = time.monotonic()
+        while not self._ended.wait(next_s - time.monotonic()):
+            next_s = max(next_s + self._period_s, time.monotonic())
+            try:
+                self._call()
+            except Exception as error:
+                if str(error) != self._fault and not self._ended.is_set():  # each is reported once
+                    self._fault = str(error)
+                    _log.exception("%s: a part of the view is missing", self._thread.name)
+
+
 class LiveView:
     """Shows a world in browsers, until it is closed.
 
-    A thread draws the present moment, or a moment of the past if a viewer has moved the time line. Nothing that a
-    viewer does can stop the thread: viser sends in another thread, and drops what a slow viewer has not received.
+    One thread draws the present moment, or a moment of the past if a viewer has moved the time line. It waits for
+    nothing: viser sends in another thread, and drops the changes that a slow viewer has missed. Two other threads keep
+    the panel up to date and show images; they may have to wait for the world.
 
     Args:
         source: Content of the view.
@@ -74,12 +104,15 @@ class LiveView:
         self._history = History()
         self._past: tuple[Moment, ...] = ()
         self._first_s = math.inf
+        self._idle_due_s = 0.0
         self._shown_image: tuple[str, float] = ("", 0.0)
-        self._ended = threading.Event()
         self.is_drawn = threading.Event()
         """Set when the first shapes have been drawn."""
-        self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
-        self._thread.start()
+        self._loops = (
+            _Loop("scene", FRAMES_HZ, self._draw),
+            _Loop("panel", REFRESH_HZ, self._refresh),
+            _Loop("images", IMAGES_HZ, self._show_image),
+        )
 
     @property
     def link(self) -> str:
@@ -92,36 +125,18 @@ class LiveView:
         return len(self._server.viser.get_clients())
 
     def close(self) -> None:
-        """Ends the view, its thread and its web server."""
-        self._ended.set()
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        """Ends the view, its threads and its web server."""
+        for loop in self._loops:
+            loop.end()
         self._source.choose_image("")
         self._server.close()
 
-    def _run(self) -> None:
-        due_s = {hz: 0.0 for hz in (IDLE_HZ, REFRESH_HZ, IMAGES_HZ)}
-        fault = ""
-        next_s = time.monotonic()
-        while not self._ended.is_set():
-            now_s = time.monotonic()
-            due = {hz for hz, at_s in due_s.items() if now_s >= at_s}
-            due_s |= {hz: now_s + 1.0 / hz for hz in due}
-            try:
-                self._draw(due)
-            except Exception as error:
-                if str(error) != fault:  # each is reported once, and the view stays
-                    fault = str(error)
-                    _log.exception("a part of the view cannot be drawn")
-            next_s = max(next_s + 1.0 / FRAMES_HZ, time.monotonic())
-            self._ended.wait(next_s - time.monotonic())
-
-    def _draw(self, due: set[float]) -> None:
+    def _draw(self) -> None:
         moment = self._source.moment()
         self._history.add(moment)
-        has_viewers = bool(self.viewers)
-        if not has_viewers and IDLE_HZ not in due:
+        if not self.viewers and moment.wall_s < self._idle_due_s:
             return
+        self._idle_due_s = moment.wall_s + 1.0 / IDLE_HZ
         self._panel.advance(1.0 / FRAMES_HZ)
         self._scene.shows_frames, self._scene.shows_names = self._panel.shows_frames, self._panel.shows_names
         self._scene.show(self._chosen(moment))
@@ -129,11 +144,10 @@ class LiveView:
             self._first_s = min(self._first_s, moment.wall_s)
             if self._source.camera is not None or moment.wall_s - self._first_s > CAMERA_S:
                 self._look_at(moment)
-        if has_viewers and REFRESH_HZ in due or IDLE_HZ in due:
-            self._panel.refresh(self._source.images)
-        self._source.choose_image(self._panel.image if has_viewers else "")
-        if has_viewers and IMAGES_HZ in due:
-            self._show_image()
+
+    def _refresh(self) -> None:
+        self._panel.refresh(self._source.images)
+        self._source.choose_image(self._panel.image if self.viewers else "")
 
     def _chosen(self, moment: Moment) -> Moment:
         """Returns the moment at the chosen point of the time line."""
@@ -145,6 +159,8 @@ class LiveView:
         return moment_at(self._past, age_s)
 
     def _show_image(self) -> None:
+        if not self.viewers:
+            return
         chosen = self._panel.image
         if not chosen:
             if self._shown_image[0]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -19,6 +21,8 @@ NOTHING = "–"
 """Choice for no object, robot or image."""
 FILE = "file"
 MAX_FACTOR, MAX_DURATION_S = 1000.0, 600.0
+SETTLED_S = 2.0
+"""Time after which a change of the real-time factor is in the state of the world [s]."""
 GOOD_S, BAD_S = 4.0, 15.0
 """Time for which a message is shown, if an action has succeeded and if it has failed [s]."""
 
@@ -50,6 +54,7 @@ class ViewPanel:
         self._robot = NOTHING
         self._asked: float | None = None
         """The real-time factor that the field shows; None before it is known."""
+        self._asked_s = -math.inf
         self.is_playing = False
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._add_world()
@@ -98,7 +103,8 @@ class ViewPanel:
         controls = self._controls
         self._status.value = controls.status()
         factor = controls.factor()
-        if factor is not None and factor != self._asked:  # at the start, or changed by another program
+        is_settled = time.monotonic() - self._asked_s > SETTLED_S  # otherwise the factor may be an older one
+        if factor is not None and factor != self._asked and is_settled:  # at the start, or changed by another program
             self._asked = factor
             self._factor.value = min(MAX_FACTOR, factor)
         robots = controls.robots()
@@ -206,7 +212,7 @@ class ViewPanel:
         self._on(mark, "Label", lambda _: controls.label(label.value.strip()))
 
     def _set_factor(self, factor: float) -> str:
-        self._asked = factor
+        self._asked, self._asked_s = factor, time.monotonic()
         return self._controls.set_factor(factor)
 
     def _show_robot(self, robot: str) -> None:

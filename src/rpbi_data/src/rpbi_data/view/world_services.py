@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import config_to_str
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from robot_model.geometry import Vector
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import (
@@ -38,8 +39,8 @@ from .world_topics import TopicSource
 
 SILENCE_S = 2.5
 """Time without a message on `rpbi/state` after which the simulator counts as ended [s]."""
-OBJECTS_S = 1.0
-"""Period of requests for the list of objects [s]."""
+OBJECTS_HZ = 1.0
+"""Rate of requests for the list of objects [Hz]."""
 ADD_LIMIT_S = 120.0
 """Longest time to wait for an object of a file [s]."""
 FOLDER = "~/rpbi_recordings"
@@ -64,12 +65,13 @@ class ServiceControls:
     def __init__(self, namespace: str, source: TopicSource) -> None:
         self._namespace, self._source = namespace, source
         self._lock = threading.Lock()
-        self._objects: tuple[float, tuple[str, ...]] = (0.0, ())
+        self._objects: tuple[str, ...] = ()
         self._robot, self._joint_states = "", b""
         self._subscriber: rospy.Subscriber | None = None
         self._recorder: Recorder | None = None
         self._episode = {"recording": False}
         self._label = rospy.Publisher("~label", String, queue_size=10)
+        WallTimer(OBJECTS_HZ, self._ask_for_objects)
         rospy.Subscriber(f"{namespace}record/status", String, self._on_status, queue_size=1)
 
     @property
@@ -153,15 +155,8 @@ class ServiceControls:
         return str(self._call(f"rpbi/{robot}/stop_motion", Trigger).message)
 
     def objects(self) -> Sequence[str]:
-        """Returns the names of all objects and cameras, which are asked for once a second."""
-        asked_s, names = self._objects
-        if time.monotonic() - asked_s > OBJECTS_S and self._has("rpbi/list_objects"):
-            try:
-                names = tuple(self._call("rpbi/list_objects", ListObjects).names)
-            except InterfaceError:
-                names = ()
-            self._objects = time.monotonic(), names
-        return names
+        """Returns the names of all objects and cameras, as a thread that may hang with the simulator knows them."""
+        return self._objects
 
     def add(self, primitive: NewObject) -> str:
         """Adds a primitive as a dynamic object."""
@@ -230,6 +225,13 @@ class ServiceControls:
             for name in names
             if (name.startswith(ours) and not name.endswith(IMAGES)) or name in (*ALSO, self._label.resolved_name)
         ]
+
+    def _ask_for_objects(self) -> None:
+        names: tuple[str, ...] = ()
+        if self._has("rpbi/list_objects"):
+            with contextlib.suppress(InterfaceError):
+                names = tuple(self._call("rpbi/list_objects", ListObjects).names)
+        self._objects = names
 
     def _on_status(self, message: String) -> None:
         with contextlib.suppress(ValueError):
