@@ -26,6 +26,7 @@ MODULES = {
     "safe_robot": "safe_robot",
     "rpbi_data": "rpbi_data",
     "rpbi_utils": "rpbi_utils",
+    "rpbi_ros2": "rpbi_ros2",
     "episodes": "episodes",
     "motion_primitives": "motion_primitives",
     "rpbi_mpc": "rpbi_mpc",
@@ -41,6 +42,7 @@ ALLOWED = {
     "safe_robot": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "rpbi_data": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "rpbi_utils": {"custom_ros_tools", "robot_model", "ros_pybullet_interface", "rpbi_data"},
+    "rpbi_ros2": {"custom_ros_tools", "ros_pybullet_interface", "rpbi_data", "rpbi_utils"},
     "motion_primitives": {"custom_ros_tools", "robot_model", "rpbi_data"},
     "rpbi_mpc": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "episodes": {"custom_ros_tools", "rpbi_data"},
@@ -72,6 +74,7 @@ BY_FEATURE = {
     "rpbi_data",
     "rpbi_examples",
     "rpbi_mpc",
+    "rpbi_ros2",
     "rpbi_utils",
     "safe_robot",
 }

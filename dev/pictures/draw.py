@@ -58,6 +58,7 @@ PICTURES: dict[str, str] = {
     "teleop.png": "rviz_people:teleop",
     "telepresence.png": "rviz_people:telepresence",
     "tracking.png": "rviz_people:tracking",
+    "browser.png": "live_page:draw_browser",
     "controls.png": "windows:controls",
     "devices.png": "windows:devices",
     "live_plot.png": "windows:live_plot",

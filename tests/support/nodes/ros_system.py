@@ -75,7 +75,7 @@ def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 120.0
         time.sleep(every_s)
 
 
-BARE = ("rostopic", "flood_targets.py", "hold_topics.py", "late_client.py", "visitor.py")
+BARE = ("rostopic", "flood_targets.py", "hold_topics.py", "late_client.py", "ros2_peer.py", "visitor.py")
 """Programs without our handling of Ctrl-C, on which rospy sometimes hangs; they have nothing to finish."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import pkgutil
 import time
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -98,6 +99,7 @@ class World:
         self.resets = 0
         """Number of resets since the world was built."""
         self._shadow: Shadow | None = None
+        self._view: Any = None
         self.physics_s = 0.0
         """Total wall time [s] that PyBullet's steps took."""
         self.loaded = loaded
@@ -445,9 +447,12 @@ class World:
         changes = self.pb.changes
         changes.recording += 1
         try:
-            return self._step()
+            samples = self._step()
         finally:
             changes.recording -= 1
+        if self._view is not None:
+            self._view.update()
+        return samples
 
     def _step(self) -> list[Any]:
         self.apply_inputs()
@@ -608,6 +613,26 @@ class World:
         if not self._description:
             self._description = describe(self.loaded, self.start_hash)
         return self._description
+
+    def view(self, host: str = "127.0.0.1", port: int = 0) -> Any:
+        """Shows the world in browsers while it is stepped, see docs/browser.md; needs the extra `html`.
+
+        Args:
+            host: Address to listen at. On another address than a loopback one, the link has a token.
+            port: Port of the page; 0 chooses a free port.
+
+        Returns:
+            A `rpbi_data.view.script_view.WorldView`, which has the address of the page as `link`, and the methods
+            `update` and `close`. A notebook shows the page.
+
+        Raises:
+            InterfaceError: If the port is in use, or the extra is missing.
+        """
+        if self._view is not None:
+            self._view.close()
+        view = pkgutil.resolve_name("rpbi_data.view.script_view:WorldView")  # of a package above this one
+        self._view = view(self, host, port)
+        return self._view
 
     def keyframe(self, recorded: str = "") -> None:
         """Makes a keyframe: moves the world into a fresh PyBullet client, and drops the earlier commands.
@@ -866,8 +891,12 @@ class World:
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Ends waiting requests with an error, ends the shadow, disconnects from PyBullet, and closes all bodies."""
+        """Ends waiting requests with an error, ends the view and the shadow, disconnects from PyBullet, and closes all
+        bodies.
+        """
         self.mailbox.close()
+        if self._view is not None:
+            self._view.close()
         self._end_shadow()
         try:
             self.halt("the simulation ended")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
@@ -20,28 +21,44 @@ MAX_CPU_S = 600
 
 
 def view(
-    recording: Annotated[Path, Argument("DIR|BAG", parse=Path, files="*.bag")],
+    recording: Annotated[Path | None, Argument("DIR|BAG", parse=Path, files="*.bag")] = None,
     number: Annotated[int | None, Argument("N", parse=int)] = None,
     *,
     out: Annotated[Path | None, Argument("FILE.html", parse=Path, files="*.html")] = None,
-    ns: Annotated[str, Argument("NAMESPACE")] = "/",
+    ns: Annotated[str | None, Argument("NAMESPACE")] = None,
+    host: Annotated[str | None, Argument("HOST")] = None,
+    port: Annotated[int | None, Argument("PORT", parse=int)] = None,
     trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
     max_cpu: Annotated[int, Argument("S", parse=int)] = MAX_CPU_S,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> str:
-    """Writes an HTML file that shows an episode: the world in 3-D with a time line, and forces as arrows and plots.
+    """Shows the running world in a browser, or writes an HTML file that shows an episode.
 
-    A browser shows the file without access to the internet. Run `./rpbi setup html` first. No ROS master is needed.
+    Without DIR or BAG, prints the link of a page that shows and controls the running simulator, until Ctrl-C. With DIR
+    or BAG, writes a page with the world in 3-D, a time line, and forces as arrows and plots; a browser shows the file
+    without access to the internet, and no ROS master is needed. Run `./rpbi setup html` first.
+
+        ./rpbi view                                       # the running world
+        ./rpbi view demos 0 --out demo.html               # an episode
 
     Args:
         DIR|BAG: a folder of episodes, or a bag with the topic rpbi/world_description
         N: number of the episode in the folder; not allowed with a bag
         out: the HTML file; default: episode_N.html, or BAG.html for BAG.bag, in the current folder
-        ns: namespace of the recorded simulator, for a bag; default: /
+        ns: namespace of the running or recorded simulator; default: ROS_NAMESPACE, and / for a bag
+        host: address to listen at for the running world; 0.0.0.0 serves other computers, too, and prints a link with a
+            token; default: 127.0.0.1
+        port: port of the page of the running world; default: 8080
         trust: Python packages from which classes named in the recording may be imported, such as object types
         max_cpu: stops after this processor time [s]; default: 600
         any_size: also reads a bag whose unpacked size exceeds both 1 GiB and 255 times its file size
     """
+    if recording is None:
+        if out is not None or trust or any_size or max_cpu != MAX_CPU_S:
+            raise UsageError("--out, --trust, --max-cpu and --any-size need a folder or a bag")
+        _show_running(ns, host, port)
+    if host is not None or port is not None:
+        raise UsageError("--host and --port are for the running world: a page of a recording is a file")
     with late_imports():
         from rpbi_data.view.bag_messages import scene_of_bag, scene_of_episode  # needs an extra
         from rpbi_data.view.page import page_of
@@ -59,7 +76,7 @@ def view(
             if number is not None:
                 scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
             else:
-                scene = scene_of_bag(recording, ns, any_size=any_size)
+                scene = scene_of_bag(recording, ns or "/", any_size=any_size)
             page, scene = page_of(scene)
         except InterfaceError:
             raise
@@ -80,3 +97,12 @@ def view(
         raise EpisodeError(target, f"cannot be written: {error.strerror or error}") from error
     lines = [f"note: {note}" for note in notes]
     return "\n".join([f"{target}: {seconds:.1f} s, {target.stat().st_size / 1e6:.2f} MB", *lines])
+
+
+def _show_running(ns: str | None, host: str | None, port: int | None) -> NoReturn:
+    """Replaces this process by the node that shows the running world."""
+    words = ["rosrun", "rpbi_data", "browser_view_node.py", f"__name:=view_{os.getpid()}"]
+    words += [] if ns is None else [f"__ns:=/{ns.strip('/')}"]
+    words += [] if host is None else [f"_host:={host}"]
+    words += [] if port is None else [f"_port:={port}"]
+    os.execvp("rosrun", words)

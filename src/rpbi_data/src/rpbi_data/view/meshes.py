@@ -20,7 +20,7 @@ except ImportError as error:
     raise MissingDependency(error.name or "trimesh", "./rpbi setup html") from None
 
 MAX_TRIANGLES = 18_000
-"""Total number of triangles on a page above which the meshes are simplified."""
+"""Total number of triangles on a page of an episode above which the meshes are simplified."""
 MIN_TRIANGLES = 200
 """Smallest number of triangles to which a mesh is reduced; smaller meshes are not simplified."""
 CREASE_RAD = 0.6
@@ -29,11 +29,14 @@ _SAME_M = 1e-6
 """Grid to which mesh corners are rounded, in the units of the mesh file. Corners at the same grid point are merged."""
 
 
-def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, TriangleMesh], list[str]]:
+def meshes_of(
+    shapes: Iterable[BodyShape], max_triangles: int = MAX_TRIANGLES
+) -> tuple[dict[BodyShape, TriangleMesh], list[str]]:
     """Returns the meshes of shapes. If they have too many triangles in total, all meshes are simplified.
 
     Args:
         shapes: Shapes of any kind. Shapes that are not meshes are left out.
+        max_triangles: Total number of triangles above which the meshes are simplified.
 
     Returns:
         The meshes, indexed by shape, and messages about unreadable meshes and about simplification.
@@ -50,7 +53,7 @@ def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, TriangleMesh
                 notes.append(f"a mesh is not shown: {' '.join(str(error).split())}")
     found = {key: mesh for key, mesh in read.items() if mesh is not None}
     total = sum(len(mesh.faces) for mesh in found.values())
-    share = MAX_TRIANGLES / max(total, MAX_TRIANGLES)
+    share = max_triangles / max(total, max_triangles)
     shown = {key: smooth_shade(_simplified(mesh, share), angle=CREASE_RAD) for key, mesh in found.items()}
     left = sum(len(mesh.faces) for mesh in shown.values())
     if left < total:

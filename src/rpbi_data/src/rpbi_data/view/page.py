@@ -13,11 +13,12 @@ import numpy as np
 import pandas as pd
 
 from custom_ros_tools.errors import MissingDependency
-from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
+from rpbi.bodies.visual_shapes import BodyShape
 
 from .first_view import FOV_RAD
 from .page_parts import BODY, HEAD
 from .scene import Array, Arrows, PageScene, ShownLink, TriangleMesh
+from .shapes import add_shape
 
 try:
     import viser
@@ -86,7 +87,7 @@ class _LinkPlayer:
             name, show_axes=False, position=self._position[0], wxyz=self._wxyz[0], visible=bool(link.is_there[0])
         )
         for number, shape in enumerate(link.shapes):
-            _add_shape(api, f"{name}/{number}", shape, meshes)
+            add_shape(api, f"{name}/{number}", shape, meshes)
 
     def show(self, number: int) -> None:
         self._frame.visible = bool(self._is_there[number])
@@ -141,26 +142,6 @@ def _arrow_scale(arrows: list[Arrows]) -> float:
     exponent = np.log10(LONG_ARROW_M / float(np.percentile(sizes, 95.0)))
     power = np.floor(exponent)
     return float(min((step * 10.0**power for step in (1, 2, 5, 10)), key=lambda each: abs(np.log10(each) - exponent)))
-
-
-def _add_shape(api: Any, name: str, shape: BodyShape, meshes: Mapping[BodyShape, TriangleMesh]) -> None:
-    x, y, z, w = shape.pose_in_link.quat_xyzw
-    size = shape.size
-    *rgb, alpha = shape.rgba
-    common: dict[str, Any] = {
-        "color": tuple(round(255 * each) for each in rgb),
-        "opacity": None if alpha >= 1.0 else alpha,
-        "position": shape.pose_in_link.position,
-        "wxyz": (w, x, y, z),
-    }
-    if shape.kind is ShapeKind.BOX:
-        api.add_box(name, dimensions=size, **common)
-    elif shape.kind is ShapeKind.SPHERE:
-        api.add_icosphere(name, radius=size[0] / 2, **common)
-    elif shape.kind is ShapeKind.CYLINDER:
-        api.add_cylinder(name, radius=size[0] / 2, height=size[2], **common)
-    elif shape in meshes:
-        api.add_mesh_simple(name, *meshes[shape], side="double", **common)
 
 
 def _rounded(values: Array, step: float) -> Array:

@@ -71,7 +71,8 @@ class Subscriptions:
         try:
             code, *_ = self._connect_topic(topic, uri)
         except Exception:
-            if not rospy.core.is_shutdown_requested():  # during the shutdown, errors are expected
+            is_left = self._topics.get_subscriber_impl(topic) is None  # the node unsubscribed in the meantime
+            if not is_left and not rospy.core.is_shutdown_requested():  # otherwise, errors are expected
                 raise
         finally:
             with self._lock:
