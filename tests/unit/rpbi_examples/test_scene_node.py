@@ -43,7 +43,7 @@ def test_error_ends_an_episode_as_failed_and_the_next_begins(monkeypatch):
     monkeypatch.setattr(Writing, "act", lambda self: iter(()))
     for name in ("loginfo", "logwarn"):
         monkeypatch.setattr(rospy, name, lambda text, *given: said.append(text % given))
-    monkeypatch.setattr(rospy, "signal_shutdown", said.append)
+    monkeypatch.setattr(node, "end_launch", said.append)
     node._run()
     failed = "seed 1 failed: nothing came on rpbi/kuka_lwr/joint_states for a while, after 0.00 s; "
     assert any(line.startswith(failed) for line in said), said
