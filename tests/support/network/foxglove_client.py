@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import socket
 import struct
 import threading
 from collections import defaultdict
@@ -13,8 +14,10 @@ import rospy
 from ros_system import wait_until
 
 try:
+    from websockets.client import ClientProtocol
     from websockets.exceptions import ConnectionClosed
     from websockets.sync.client import connect
+    from websockets.uri import parse_uri
 except ImportError:
     from custom_ros_tools.errors import MissingDependency
 
@@ -31,7 +34,6 @@ class FoxgloveClient:
     Args:
         port: Port of the server.
         host: Its address.
-        reads: Whether the thread reads; a viewer that does not is a slow one.
 
     Attributes:
         info: The server's first message.
@@ -43,7 +45,7 @@ class FoxgloveClient:
         parameters: Names and values of parameters, as they came.
     """
 
-    def __init__(self, port: int, host: str = "127.0.0.1", reads: bool = True) -> None:
+    def __init__(self, port: int, host: str = "127.0.0.1") -> None:
         self._socket = connect(f"ws://{host}:{port}", subprotocols=[SUBPROTOCOL], max_size=None, compression=None)
         self.info: dict[str, Any] = {}
         self.channels: dict[str, dict[str, Any]] = {}
@@ -57,9 +59,8 @@ class FoxgloveClient:
         self._subscriptions: dict[int, str] = {}
         self._numbers = itertools.count(1)
         self._thread = threading.Thread(target=self._read, daemon=True)
-        if reads:
-            self._thread.start()
-            wait_until(lambda: self.info, "the server says who it is")
+        self._thread.start()
+        wait_until(lambda: self.info, "the server says who it is")
 
     def __enter__(self) -> FoxgloveClient:
         return self
@@ -70,10 +71,6 @@ class FoxgloveClient:
     def close(self) -> None:
         """Leaves."""
         self._socket.close()
-
-    def abort(self) -> None:
-        """Leaves without a word, for a viewer that does not read."""
-        self._socket.socket.close()
 
     def op(self, name: str, **fields: Any) -> None:
         """Sends a message in JSON."""
@@ -94,10 +91,6 @@ class FoxgloveClient:
             number = next(self._numbers)
             self._subscriptions[number] = topic
             self.op("subscribe", subscriptions=[{"id": number, "channelId": self.channels[topic]["id"]}])
-
-    def subscribe_blindly(self, channels: list[int]) -> None:
-        """Subscribes to channels by number, for a viewer that does not read."""
-        self.op("subscribe", subscriptions=[{"id": next(self._numbers), "channelId": each} for each in channels])
 
     def unsubscribe(self, topic: str) -> None:
         """Leaves a topic."""
@@ -195,6 +188,29 @@ class FoxgloveClient:
             self.parameters.append(("", message.get("id")))
         elif op == "status":
             self.statuses.append(message["message"])
+
+
+class StalledViewer:
+    """A viewer that subscribes to a channel, and then takes nothing from the network.
+
+    Args:
+        port: Port of the server.
+        channel: Number of the channel.
+    """
+
+    def __init__(self, port: int, channel: int) -> None:
+        protocol = ClientProtocol(parse_uri(f"ws://127.0.0.1:{port}"), subprotocols=[SUBPROTOCOL])
+        self._socket = socket.create_connection(("127.0.0.1", port))
+        protocol.send_request(protocol.connect())
+        self._socket.sendall(b"".join(protocol.data_to_send()))
+        protocol.receive_data(self._socket.recv(1000))
+        subscription = {"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channel}]}
+        protocol.send_text(json.dumps(subscription).encode())
+        self._socket.sendall(b"".join(protocol.data_to_send()))
+
+    def close(self) -> None:
+        """Leaves without a word."""
+        self._socket.close()
 
 
 def lost(ros: Any, viewer: FoxgloveClient, topic: str, count: int) -> tuple[int, int, int]:

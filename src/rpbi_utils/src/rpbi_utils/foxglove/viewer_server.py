@@ -47,10 +47,10 @@ ASSET_SUFFIXES = (".bmp", ".dae", ".glb", ".gltf", ".jpeg", ".jpg", ".mtl", ".ob
 MAX_ASSET_BYTES = 50_000_000
 
 
-BACKLOG = 512
-"""Number of messages that wait for a slow viewer; then the oldest are dropped. A viewer that takes nothing is
-disconnected when this number of times waits, so after 10 s at `TIME_HZ`."""
-TIME_HZ = 50.0
+BACKLOG = 256
+"""Number of messages that wait for a slow viewer, after which the oldest are dropped. Joint states at 1 kHz fill it in
+0.25 s, and images of 640x480 then take 240 MB."""
+TIME_HZ = 30.0
 """Rate at which viewers are sent the time [Hz]."""
 
 
