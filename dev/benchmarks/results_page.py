@@ -23,13 +23,13 @@ Compare these figures with those of your computer:
 
 <!-- not run: takes minutes -->
 ```shell
-./rpbi bench loop            # one benchmark; without a name, all that take less than some minutes
+./rpbi bench loop            # one benchmark; without a name, all that take at most a few minutes
 ./rpbi bench loop --page     # also onto this page
 ```
 
-The floor is the same quantity of the simplest program that does the job, measured in the same run. A quick run measures
-for a shorter time. A load average above the number of cores means that other programs were busy. Neither shows how fast
-the simulator can be.
+The column "floor" contains the same quantity for the simplest program that does the same job, measured in the same run.
+A quick run measures for a shorter time. A load average above the number of cores means that other programs were busy.
+Neither a quick run nor a busy computer shows how fast the simulator can be.
 """
 COLUMNS = ("figure", "value", "unit", "floor", "value / floor", "target", "reached")
 
