@@ -19,7 +19,7 @@ import time
 from functools import partial
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 from urllib.parse import parse_qs, urlsplit
 
 from custom_ros_tools.errors import InterfaceError, MissingDependency
@@ -50,6 +50,8 @@ PING_S, MAX_PONG_S = 10.0, 20.0
 """Time between two checks of a connection, and time after which a viewer that does not answer is disconnected [s]."""
 MAX_FAREWELL_S = 1.0
 """Longest time to wait for a viewer's answer when its connection is closed [s]."""
+REPORT_S = 60.0
+"""Shortest time between two warnings about viewers that send other messages [s]."""
 COOKIE = "rpbi_view"
 FRAMES = "frame-ancestors 'self' http://localhost:* http://127.0.0.1:*"
 """Pages that may contain the view: those of notebooks on this computer."""
@@ -103,7 +105,8 @@ def is_allowed(message: bytes | str) -> bool:
 class ViewerConnection(ServerConnection):
     """Connection to a viewer, which reads a limited number of messages, and only allowed ones."""
 
-    _budget, _read_s, _is_reported = BURST, 0.0, False
+    _budget, _read_s = BURST, 0.0
+    _reported_s: ClassVar[float] = -math.inf
 
     async def recv(self, decode: bool | None = None) -> Any:
         """Returns the next allowed message. While a viewer sends too many messages, its connection is not read."""
@@ -116,8 +119,8 @@ class ViewerConnection(ServerConnection):
                 await asyncio.sleep(-self._budget / MESSAGES_PER_S)
             if is_allowed(message):
                 return message
-            if not self._is_reported:
-                self._is_reported = True
+            if now_s - ViewerConnection._reported_s > REPORT_S:
+                ViewerConnection._reported_s = now_s
                 _log.warning("a viewer sends messages that no page of this view sends: they are ignored")
 
 
