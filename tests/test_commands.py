@@ -198,8 +198,8 @@ def test_launch_refuses_an_argument_that_the_launch_file_lacks():
     assert done.returncode == 2
     assert done.stderr == (
         "launch: unknown argument of run_kuka 'real_time_facotr': "
-        "known are guard, gui, headless, real_robot, real_time_factor, ros2, rviz, stand_in, start, use_sim_time, "
-        "view; did you mean 'real_time_factor'?\n"
+        "known are foxglove, guard, gui, headless, real_robot, real_time_factor, ros2, rviz, stand_in, start, "
+        "use_sim_time, view; did you mean 'real_time_factor'?\n"
     )
 
 

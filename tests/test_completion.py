@@ -61,7 +61,7 @@ def test_a_tab_offers_all_commands(terminal):
 
 
 def test_arguments_of_a_launch_file_are_offered(terminal):
-    solver, windows = {"drag:=", "ik:=", "ik_hz:="}, {"gui:=", "headless:=", "ros2:=", "rviz:=", "view:="}
+    solver, windows = {"drag:=", "ik:=", "ik_hz:="}, {"foxglove:=", "gui:=", "headless:=", "ros2:=", "rviz:=", "view:="}
     expected = (
         solver | windows | {"guard:=", "real_robot:=", "real_time_factor:=", "stand_in:=", "start:=", "use_sim_time:="}
     )

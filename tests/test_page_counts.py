@@ -141,7 +141,8 @@ def test_the_page_has_every_extra_wherever_it_names_all():
     assert set(SIZES) == set(EXTRAS)
     for file in ("docs/installation.md", "docs/contributing.md"):
         lists = [
-            line.split() for line in re.findall(r"\./rpbi setup ((?:[a-z]+ ){5,}[a-z]+)", (ROOT / file).read_text())
+            line.split()
+            for line in re.findall(r"\./rpbi setup ((?:[a-z0-9]+ ){5,}[a-z0-9]+)", (ROOT / file).read_text())
         ]
         assert lists and all(set(names) == set(EXTRAS) for names in lists), file
 

@@ -34,6 +34,7 @@ from std_srvs.srv import Trigger
 
 ANSWER_S = 600.0  # longest time to the next answer about a request [s]
 CONNECT_S = 5.0  # longest time to wait for the bridge [s]
+AGAIN_S = 1.0  # time after which a request without an answer is sent again [s]
 POLL_S = 0.02  # time between two looks at whether a motion is to be cancelled [s]
 LIST_S = 2.0  # time between two questions for robots [s]
 THREADS = 16
@@ -67,14 +68,17 @@ class Simulator:
         number = uuid.uuid4().hex
         answers = self._answers[number] = queue.Queue()
         try:
-            self._send(number, function, arguments)
-            end = time.monotonic() + ANSWER_S
+            start = time.monotonic()
+            end, again = start + ANSWER_S, start
             while time.monotonic() < end:
+                if time.monotonic() >= again:  # the first may come before the bridge listens; it runs each once
+                    self._send(number, function, arguments)
+                    again += AGAIN_S
                 if is_cancelled and is_cancelled():
                     is_cancelled = None
                     self._send(number, "cancel", {})
                 try:
-                    answer = answers.get(timeout=POLL_S if on_feedback else ANSWER_S)
+                    answer = answers.get(timeout=POLL_S if on_feedback else AGAIN_S)
                 except queue.Empty:
                     continue
                 if "success" in answer:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
 from io import BytesIO
 from typing import Any
 
-import genpy
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
-from random_messages import message_classes, random_message
+from random_messages import converted_classes, random_message, without_seq
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
@@ -36,27 +34,10 @@ def layout_of(message_class: Any) -> Ros2Type:
     return ros2_type(message_class._type, message_class._full_text, OWN_PACKAGES)
 
 
-def converted_classes(package: str) -> Iterator[tuple[Any, Ros2Type]]:
-    """Yields the message classes of a package that are converted, with their layouts."""
-    for message_class in message_classes(package):
-        try:
-            yield message_class, layout_of(message_class)
-        except RefusedTypeError:
-            continue
-
-
 def raw_of(message: Any) -> bytes:
     buffer = BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
-
-
-def without_seq(value: Any) -> Any:
-    """Returns a message as nested lists and values, without the numbers of headers, which ROS 2 lacks."""
-    if isinstance(value, genpy.Message):
-        names = [name for name in value.__slots__ if (value._type, name) != ("std_msgs/Header", "seq")]
-        return [without_seq(getattr(value, name)) for name in names]
-    return [without_seq(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
 def register(layout: Ros2Type) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 
 import pytest
-import rospy
+from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Twist
 from ros2_system import STATE, connect
 from ros_system import RosSystem, wait_until
@@ -66,9 +67,8 @@ def test_second_bridge_in_a_domain_ends_with_one_line(ros, ros2, publisher):
     [
         (["_interface:=eth7"], "interface: no network interface 'eth7'"),
         (["_domain_id:=233"], "domain_id: must be"),
-        (["_topics:="], "topics"),
     ],
-    ids=["interface", "domain", "topics"],
+    ids=["interface", "domain"],
 )
 def test_wrong_parameters_end_the_bridge_with_one_line(ros, ros2, words, message):
     bridge = ros2.bridge(*words)
@@ -91,18 +91,29 @@ def test_missing_extra_is_named(ros, tmp_path):
     assert "'cyclonedds' is not installed: ./rpbi setup ros2" in ros.output(bridge).splitlines()[-1]
 
 
-def test_bad_messages_and_unknown_types_are_named_and_others_pass(ros, ros2, publisher):
-    publisher("/diagnostics_of_no_package", rospy.AnyMsg)
+def test_hostile_messages_are_dropped_and_others_pass(ros, ros2):
+    """Cyclone DDS itself compares each message with its type."""
     twists = ros.listen("/base/cmd_vel", Twist)
-    bridge, peer = ros2.bridge("_packages:=my_robot_msgs"), ros2.peer()
+    bridge, peer = ros2.bridge(), ros2.peer()
     peer.write("/base/cmd_vel", "geometry_msgs/msg/Twist")
     wait_until(lambda: peer.readers("/base/cmd_vel"), "the bridge reads")
-    for broken in (b"\x00\x01\x00\x00\x01", b"\x00\x00\x00\x00" + bytes(48), b"\x00\x01\x00\x00" + bytes(400)):
-        peer.publish("/base/cmd_vel", broken)
+    for broken in (b"\0\1\0\0\1", b"\0\1\0\0" + bytes(8), b"\0\1\0\0" + bytes(400)):
+        with contextlib.suppress(RuntimeError):  # rclpy refuses some itself
+            peer.publish("/base/cmd_vel", broken)
     peer.publish("/base/cmd_vel", {"linear": {"x": 0.25}})
-    assert [each.linear.x for each in twists.wait_for(1)] == [0.25]
-    lines = [line for line in ros.output(bridge).splitlines() if "message from ROS 2 refused" in line]
-    assert len(lines) == 3 and all("/base/cmd_vel" in line for line in lines)
+    wait_until(lambda: any(each.linear.x == 0.25 for each in twists.messages), "the other message passes")
+    lines = [line for line in ros.output(bridge).splitlines() if "/base/cmd_vel" in line]
+    assert lines and all("failed" in line or "refused" in line for line in lines) and bridge.poll() is None
+
+
+def test_unknown_type_is_named_and_others_pass(ros, ros2, publisher):
+    publisher("/plan", JointTrajectoryControllerState)
+    out = publisher("/arm/joint_states", JointState)
+    bridge, peer = ros2.bridge(), ros2.peer()
+    peer.listen("/arm/joint_states", STATE)
+    connect(peer, "/arm/joint_states", out, JointState())
+    line = "not connected with ROS 2: control_msgs/JointTrajectoryControllerState has other fields in ROS 2"
+    assert ros.output(bridge).count(line) == 1 and "/plan" not in peer.topics()
 
 
 def test_other_publisher_of_a_topic_is_named_once(ros, ros2, publisher):
@@ -120,11 +131,20 @@ def test_requests_without_sense_are_refused(ros, ros2):
     peer.listen("/rpbi/ros2/response", text)
     peer.write(request, text)
     wait_until(lambda: peer.readers(request), "the bridge reads")
+
+    def is_answered() -> bool:
+        peer.publish(request, {"data": '{"id": "fly", "call": "fly", "arguments": {}}'})
+        return bool(peer.count("/rpbi/ros2/response"))
+
+    wait_until(is_answered, "it answers")
     for bad in ("", "[]", "{}", "[" * 5000, '{"id": 1, "call": "start", "arguments": {}}', "x" * 2_000_000):
         peer.publish(request, {"data": bad})
-    for call, arguments in (("fly", "{}"), ("step", '{"steps": "many"}'), ("move", "{}"), ("start", "{}")):
+    for call, arguments in (("step", '{"steps": "many"}'), ("move", "{}"), ("start", "{}"), ("start", "{}")):
         peer.publish(request, {"data": f'{{"id": "{call}", "call": "{call}", "arguments": {arguments}}}'})
-    wait_until(lambda: peer.count("/rpbi/ros2/response") >= 4, "the others are answered", 20.0)
-    answers = " ".join(each["data"] for each in peer.messages("/rpbi/ros2/response"))
-    assert answers.count('"success": false') == 4 and "unknown call 'fly'" in answers
+
+    def answers() -> list[str]:
+        return [each["data"] for each in peer.messages("/rpbi/ros2/response")]
+
+    wait_until(lambda: all(f'"id": "{call}"' in " ".join(answers()) for call in ("step", "move", "start")), "answers")
+    assert all('"success": false' in each for each in answers()) and "unknown call 'fly'" in answers()[0]
     assert "request from ROS 2 refused" in ros.output(bridge) and bridge.poll() is None

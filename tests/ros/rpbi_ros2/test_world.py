@@ -26,7 +26,7 @@ def arm(ros, tmp_path):
 
 
 @pytest.mark.quick
-def test_ros2_target_moves_the_arm_and_clock_drives_time(arm, ros2):
+def test_target_moves_the_arm_and_clock_drives_time(arm, ros2):
     ros2.bridge()
     peer = ros2.peer()
     peer.use_sim_time(True)

@@ -83,7 +83,7 @@ def test_topics_are_offered_as_they_are(demo, viewer):
 
 
 def test_only_requested_topics_are_subscribed_to(demo):
-    assert subscriptions() == set()
+    wait_until(lambda: subscriptions() == set(), "no topic is subscribed to")
     with FoxgloveClient(demo.port) as one, FoxgloveClient(demo.port) as other:
         wait_until(lambda: STATES in one.channels, "topics are offered")
         assert subscriptions() == set()

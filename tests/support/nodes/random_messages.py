@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import string
 import struct
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
@@ -12,6 +13,8 @@ import genpy
 from genmsg.msgs import parse_type
 from genpy.base import is_simple
 from roslib.message import get_message_class
+
+from rpbi_ros2.layouts import OWN_PACKAGES, RefusedTypeError, Ros2Type, ros2_type
 
 RANGES = {
     "byte": (-(2**7), 2**7), "char": (0, 2**8), "int8": (-(2**7), 2**7), "uint8": (0, 2**8),
@@ -29,6 +32,23 @@ def message_classes(package: str) -> list[Any]:
     found = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, genpy.Message)]
     parts = ("Action", "ActionGoal", "ActionResult", "ActionFeedback", "Goal", "Result", "Feedback")
     return [each for each in found if not (each.__name__.endswith(parts) and each.__name__ not in ("JointGoal",))]
+
+
+def converted_classes(package: str) -> Iterator[tuple[Any, Ros2Type]]:
+    """Yields the message classes of a package that the bridge converts, with their layouts in ROS 2."""
+    for message_class in message_classes(package):
+        try:
+            yield message_class, ros2_type(message_class._type, message_class._full_text, OWN_PACKAGES)
+        except RefusedTypeError:
+            continue
+
+
+def without_seq(value: Any) -> Any:
+    """Returns a message as nested lists and values, without the numbers of headers, which ROS 2 lacks."""
+    if isinstance(value, genpy.Message):
+        names = [name for name in value.__slots__ if (value._type, name) != ("std_msgs/Header", "seq")]
+        return [without_seq(getattr(value, name)) for name in names]
+    return [without_seq(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
 def random_message(message_class: Any, generator: random.Random) -> Any:

@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from functools import cache
+from itertools import count
 from multiprocessing.connection import Client
 from pathlib import Path
 from typing import Any
@@ -116,7 +117,7 @@ class Ros2:
     """
 
     def __init__(self, ros: RosSystem, domain: int, *prefixes: Path) -> None:
-        self.folder, self.domain, self._ros = ros2_folder(), domain, ros
+        self.folder, self.domain, self._ros, self._numbers = ros2_folder(), domain, ros, count()
         self.environment = {
             "ROS_DOMAIN_ID": str(domain),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -141,7 +142,7 @@ class Ros2:
 
     def peer(self) -> Ros2Peer:
         """Starts a node with rclpy."""
-        return Ros2Peer(self, self._ros.folder / f"peer{len(self._ros.processes)}")
+        return Ros2Peer(self, self._ros.folder / f"peer{next(self._numbers)}")
 
 
 class Ros2Peer:

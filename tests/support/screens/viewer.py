@@ -56,6 +56,7 @@ class Viewer:
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
             additional_headers=headers or {},
             compression=None,
+            close_timeout=1.0,
             max_size=None,
         )
         self.send(CAMERA)

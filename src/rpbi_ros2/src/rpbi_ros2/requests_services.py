@@ -38,6 +38,8 @@ REQUEST, RESPONSE = "rpbi/ros2/request", "rpbi/ros2/response"
 """Names of the two topics, relative to the bridge's namespace."""
 MAX_BYTES = 1 << 20
 """Largest size of a request [bytes]; a trajectory with 1,000 points of seven joints has 0.4 MB."""
+MAX_ANSWERED = 100
+"""Largest number of answers that are kept for repeated requests."""
 MAX_RUNNING = 32
 """Largest number of requests that run at the same time."""
 STATUS_S = 3.0
@@ -55,10 +57,11 @@ class CompanionRequests:
     def __init__(self, respond: Callable[[str], None]) -> None:
         self._respond = respond
         self._running: dict[str, RequestedMotion | None] = {}
+        self._answered: dict[str, Answer] = {}
         self._lock = threading.Lock()
 
     def accept(self, text: bytes) -> None:
-        """Begins to run a request.
+        """Begins to run a request; one that has come before is not run again, since programs repeat requests.
 
         Raises:
             ValueError: If the request is invalid.
@@ -69,12 +72,17 @@ class CompanionRequests:
             if motion is not None:
                 motion.cancel()
             return
+        if number in self._answered:  # the answer was lost
+            self._answer(number, self._answered[number])
+            return
+        if number in self._running:
+            return
         if name not in CALLS and name != "follow":
             self._answer(number, _failure(f"unknown call '{name[:40]}'; known are {', '.join([*CALLS, 'follow'])}"))
             return
         with self._lock:
-            if number in self._running or len(self._running) >= MAX_RUNNING:
-                raise ValueError(f"'{number[:40]}' runs already, or {MAX_RUNNING} others do")
+            if len(self._running) >= MAX_RUNNING:
+                raise ValueError(f"{MAX_RUNNING} others run")
             motion = RequestedMotion(lambda feedback: self._answer(number, feedback)) if name == "follow" else None
             self._running[number] = motion
         call = CALLS[name] if motion is None else motion.run
@@ -90,6 +98,9 @@ class CompanionRequests:
         finally:
             with self._lock:
                 del self._running[number]
+        self._answered[number] = answer
+        if len(self._answered) > MAX_ANSWERED:
+            del self._answered[next(iter(self._answered))]
         self._answer(number, answer)
 
     def _answer(self, number: str, answer: Answer) -> None:

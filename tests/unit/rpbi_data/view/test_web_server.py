@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -154,7 +155,7 @@ def test_flood_is_read_slowly(server: WebServer) -> None:
     button.on_click(lambda _: presses.append(1))
     flood = Viewer(server.link)
     flood.wait(lambda: flood.find("press"))
-    count = 10 * int(BURST)
+    count = 3 * int(BURST)
     for _ in range(count):
         flood.press("press")
     with Viewer(server.link) as viewer:
@@ -199,6 +200,12 @@ def test_silent_connections_do_not_keep_others_out(server: WebServer) -> None:
     assert get(server.link).status == 200
     for each in silent:
         each.close()
+
+
+def test_server_that_cannot_be_guarded_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rpbi_data.view.web_server.websockets_server", SimpleNamespace(serve=None))
+    with pytest.raises(InterfaceError, match="in another way"):
+        WebServer("127.0.0.1", 0)
 
 
 def test_missing_extra_is_named_with_its_command() -> None:

@@ -72,8 +72,8 @@ class _Loop:
 
     def _run(self) -> None:
         next_s = time.monotonic()
-        while not self._ended.wait(next_s - time.monotonic()):
-            next_s = max(next_s + self._period_s, time.monotonic())
+        while not self._ended.wait(max(0.0, next_s - time.monotonic())):
+            next_s = max(next_s + self._period_s, time.monotonic() - self._period_s)  # keeps the mean rate
             try:
                 self._call()
             except Exception as error:

@@ -19,7 +19,7 @@ import time
 from functools import partial
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 from urllib.parse import parse_qs, urlsplit
 
 from custom_ros_tools.errors import InterfaceError, MissingDependency
@@ -48,6 +48,10 @@ SEND_BUFFER_BYTES = 262_144
 """Size of the buffer of a slow viewer in the kernel; viser drops outdated poses only before this buffer."""
 PING_S, MAX_PONG_S = 10.0, 20.0
 """Time between two checks of a connection, and time after which a viewer that does not answer is disconnected [s]."""
+MAX_FAREWELL_S = 1.0
+"""Longest time to wait for a viewer's answer when its connection is closed [s]."""
+REPORT_S = 60.0
+"""Shortest time between two warnings about viewers that send other messages [s]."""
 COOKIE = "rpbi_view"
 FRAMES = "frame-ancestors 'self' http://localhost:* http://127.0.0.1:*"
 """Pages that may contain the view: those of notebooks on this computer."""
@@ -101,7 +105,8 @@ def is_allowed(message: bytes | str) -> bool:
 class ViewerConnection(ServerConnection):
     """Connection to a viewer, which reads a limited number of messages, and only allowed ones."""
 
-    _budget, _read_s, _is_reported = BURST, 0.0, False
+    _budget, _read_s = BURST, 0.0
+    _reported_s: ClassVar[float] = -math.inf
 
     async def recv(self, decode: bool | None = None) -> Any:
         """Returns the next allowed message. While a viewer sends too many messages, its connection is not read."""
@@ -114,8 +119,8 @@ class ViewerConnection(ServerConnection):
                 await asyncio.sleep(-self._budget / MESSAGES_PER_S)
             if is_allowed(message):
                 return message
-            if not self._is_reported:
-                self._is_reported = True
+            if now_s - ViewerConnection._reported_s > REPORT_S:
+                ViewerConnection._reported_s = now_s
                 _log.warning("a viewer sends messages that no page of this view sends: they are ignored")
 
 
@@ -170,13 +175,13 @@ class WebServer:
         link: Address of the page, with the token if one is needed.
 
     Raises:
-        InterfaceError: If the address or the port cannot be used.
+        InterfaceError: If the address or the port cannot be used, or this version of viser cannot be guarded.
     """
 
     def __init__(self, host: str, port: int) -> None:
         token = None if host in LOOPBACK else secrets.token_urlsafe(16)
         listening = _listen(host, port)
-        self._gate = Gate(token)
+        self._gate, self._is_guarded = Gate(token), False
         with _opening, contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
             serve = websockets_server.serve
             websockets_server.serve = partial(self._serve, serve, listening)  # type: ignore[misc, assignment]
@@ -184,6 +189,10 @@ class WebServer:
                 self.viser = viser.ViserServer(host=host, port=port, label="", verbose=False)
             finally:
                 websockets_server.serve = serve  # type: ignore[misc]
+            if not self._is_guarded:
+                self.viser.stop()
+                listening.close()
+                raise InterfaceError(f"viser {viser.__version__} opens its server in another way: ./rpbi setup html")
         shown = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
         shown = f"[{shown}]" if ":" in shown else shown
         self.link = f"http://{shown}:{listening.getsockname()[1]}/" + (f"?token={token}" if token else "")
@@ -196,6 +205,7 @@ class WebServer:
     def _serve(self, serve: Any, listening: socket.socket, handler: Any, _: str, __: int, **options: Any) -> Any:
         """Starts the server of `websockets` for viser, with the socket and the limits of this module."""
         page = options.pop("process_request")
+        self._is_guarded = True
 
         def process_request(connection: ServerConnection, request: Request) -> Response | None:
             response = self._gate.answer(request)
@@ -208,7 +218,8 @@ class WebServer:
                 response.headers["Content-Security-Policy"] = FRAMES
             return response
 
-        limits: dict[str, Any] = {"max_size": MAX_MESSAGE_BYTES, "ping_interval": PING_S, "ping_timeout": MAX_PONG_S}
+        times = {"ping_interval": PING_S, "ping_timeout": MAX_PONG_S, "close_timeout": MAX_FAREWELL_S}
+        limits: dict[str, Any] = {"max_size": MAX_MESSAGE_BYTES, **times}
         return serve(
             handler,
             sock=listening,

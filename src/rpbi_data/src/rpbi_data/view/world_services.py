@@ -165,8 +165,8 @@ class ServiceControls:
 
     def add_file(self, file: str, name: str, position: Vector) -> str:
         """Adds the object of a file, as the command `spawn` does."""
-        if not file:
-            raise InterfaceError("expected the name of a file")
+        if not file or file.startswith("-") or name.startswith("-"):
+            raise InterfaceError("expected the name of a file, and names that do not begin with '-'")
         words = ["rosrun", "rpbi_utils", "world", "spawn", file, "--ns", self._namespace, "--at", *map(str, position)]
         words += ["--name", name] if name else []
         try:

@@ -11,7 +11,8 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 from urllib.parse import unquote, urlsplit
@@ -43,6 +44,8 @@ MAX_IMAGE_PX = 480
 MAX_IMAGE_BYTES = 50_000_000
 MAX_POINTS = 300_000
 """Maximum number of points of a marker; a larger marker is not shown."""
+MAX_REFUSED = 50
+"""Maximum number of warnings about markers that cannot be shown."""
 LINE_M = 0.004
 CAMERA = "camera"
 SHAPES = {
@@ -92,6 +95,8 @@ class TopicSource:
         self._received: dict[str, dict[Name, _Received]] = {}
         """Items, indexed by topic and name."""
         self._items: dict[Name, Item] = {}
+        self._refused: set[Name] = set()
+        """Markers that cannot be shown, of which a warning was logged."""
         self._subscribers: dict[str, rospy.Subscriber] = {}
         self._image: rospy.Subscriber | None = None
         self._image_topic = ""
@@ -211,28 +216,49 @@ class TopicSource:
 
     def _apply(self, topic: str, markers: list[Marker]) -> None:
         now_s = time.monotonic()
+        items = list(self._items_of(topic, markers))
         with self._lock:
             known = self._received.get(topic, {})
             of_topic = {} if topic == f"{self._namespace}rpbi/markers" else dict(known)  # that one is always complete
-            for marker in markers:
-                name = marker.ns or topic, f"{topic} {marker.id}"
-                if marker.action == Marker.DELETEALL:
-                    of_topic.clear()
-                elif marker.action == Marker.DELETE:
-                    of_topic.pop(name, None)
-                else:
-                    try:
-                        item = item_of(marker, self._world)
-                    except (ValueError, OSError) as error:
-                        _log.warning("%s: marker %d of '%s' is not shown: %s", topic, marker.id, marker.ns, error)
-                        continue
-                    lifetime_s = marker.lifetime.to_sec()
-                    before = known.get(name)
-                    if before is not None and _equals(before.item, item):
-                        item = before.item
-                    of_topic[name] = _Received(item, now_s + lifetime_s if lifetime_s > 0.0 else math.inf)
+            for name, item, lifetime_s in items:
+                if item is None or name is None:
+                    of_topic = {each: kept for each, kept in of_topic.items() if name not in (None, each)}
+                    continue
+                before = known.get(name)
+                if before is not None and _equals(before.item, item):
+                    item = before.item
+                of_topic[name] = _Received(item, now_s + lifetime_s if lifetime_s > 0.0 else math.inf)
             self._received[topic] = of_topic
             self._collect()
+
+    def _items_of(self, topic: str, markers: list[Marker]) -> Iterator[tuple[Name | None, Item | None, float]]:
+        """Yields names, items and lifetimes [s]; no item to remove the item of a name, no name either to remove all.
+
+        Arrows that replace all markers of a topic, such as contact forces, become one item for each namespace.
+        """
+        is_complete = bool(markers) and markers[0].action == Marker.DELETEALL
+        arrows: dict[str, LinesItem] = {}
+        for marker in markers:
+            name = marker.ns or topic, f"{topic} {marker.id}"
+            if marker.action in (Marker.DELETEALL, Marker.DELETE):
+                yield None if marker.action == Marker.DELETEALL else name, None, 0.0
+                continue
+            try:
+                item = item_of(marker, self._world)
+            except (ValueError, OSError) as error:
+                if name not in self._refused and len(self._refused) < MAX_REFUSED:
+                    self._refused.add(name)
+                    _log.warning("%s: marker %d of '%s' is not shown: %s", topic, marker.id, marker.ns, error)
+                continue
+            if is_complete and isinstance(item, LinesItem) and item.are_arrows:
+                first = arrows.get(name[0], item)
+                if (first.frame, first.pose, first.rgba) == (item.frame, item.pose, item.rgba):
+                    points = item.points if first is item else np.concatenate([first.points, item.points])
+                    arrows[name[0]] = replace(first, points=points)
+                    continue
+            yield name, item, marker.lifetime.to_sec()
+        for group, arrow in arrows.items():
+            yield (group, topic), arrow, 0.0
 
     def _on_camera(self, topic: str, message: CameraInfo) -> None:
         if not (message.K[4] > 0.0 and message.height and message.width):
