@@ -103,3 +103,12 @@ def test_trajectory_by_the_action_ends_at_its_goal(arm, ros, domain):
     wrong = {"trajectory": {"joint_names": ["elbow"], "points": [{"positions": [0.0], "time_from_start": {"sec": 1}}]}}
     status, result, _ = peer.act(action, kind, wrong)
     assert status == 6 and "elbow" in result["error_string"]
+
+
+@pytest.mark.thorough
+def test_launch_file_of_an_example_starts_the_bridge(ros, ros2):
+    command = ["roslaunch", "rpbi_examples", "run_kuka.launch", "headless:=true", "ros2:=true"]
+    ros.start(command, ROS_DOMAIN_ID=str(ros2.domain))
+    peer = ros2.peer()
+    peer.listen("/rpbi/kuka_lwr/joint_states", STATE)
+    wait_until(lambda: peer.count("/rpbi/kuka_lwr/joint_states"), "the robot is seen")
