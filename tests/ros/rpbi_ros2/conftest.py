@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from typing import Any
 from urllib.parse import urlparse
 
@@ -24,7 +25,8 @@ def domain(ros_master: str) -> int:
 
 @pytest.fixture
 def ros2(ros: RosSystem, domain: int) -> Ros2:
-    """Starts programs with ROS 2, which end with the test."""
+    """Starts programs with ROS 2, which end with the test; without the extra `ros2`, the test is skipped or fails."""
+    import_module("cyclonedds")
     return Ros2(ros, domain)
 
 

@@ -56,6 +56,7 @@ def test_joint_states_at_1_khz_arrive_equal_and_in_order(ros2, publisher):
     assert (reliability, durability) == ("RELIABLE", "VOLATILE") and hash_text.startswith("RIHS01_a13ee3a3")
 
 
+@pytest.mark.thorough
 def test_images_arrive_with_their_camera_info(ros2, publisher):
     images, infos = publisher("/camera/image", Image), publisher("/camera/camera_info", CameraInfo)
     ros2.bridge()
@@ -74,6 +75,7 @@ def test_images_arrive_with_their_camera_info(ros2, publisher):
     assert peer.messages("/camera/camera_info")[-1]["k"] == [float(i) for i in range(9)]
 
 
+@pytest.mark.thorough
 def test_topics_without_readers_are_not_subscribed_to(ros2, publisher):
     out = publisher("/wanted/wrench", WrenchStamped)
     ros2.bridge()
@@ -123,6 +125,7 @@ def test_first_command_from_ros2_is_not_lost(ros, ros2):
     assert [each.position[0] for each in heard.wait_for(51)[1:]] == [float(i) for i in range(50)]
 
 
+@pytest.mark.thorough
 def test_own_messages_do_not_return(ros, ros2, publisher):
     """A topic that both sides of ROS 1 have is carried in both directions."""
     out, heard = publisher("/both", Float64MultiArray), ros.listen("/both", Float64MultiArray)
@@ -139,3 +142,12 @@ def test_own_messages_do_not_return(ros, ros2, publisher):
     time.sleep(0.5)
     assert [each.data[0] for each in heard.messages] == [1.0, 2.0]
     assert sorted(each["data"][0] for each in peer.messages("/both")) == [1.0, 2.0]
+
+
+@pytest.mark.thorough
+def test_publisher_with_best_effort_is_named(ros, ros2):
+    ros.listen("/arm/target", JointState)
+    bridge, peer = ros2.bridge(), ros2.peer()
+    wait_until(lambda: "/arm/target" in peer.topics(), "the bridge reads")
+    peer.write("/arm/target", STATE, best_effort=True)
+    wait_until(lambda: "/arm/target: a publisher in ROS 2 has best effort" in ros.output(bridge), "it is named")

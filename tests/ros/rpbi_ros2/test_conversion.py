@@ -25,7 +25,7 @@ pytestmark = pytest.mark.quick
 NOT_IN_DEBIAN = {"shape_msgs", "stereo_msgs"}
 PACKAGES = sorted((COMMON_PACKAGES | OWN_PACKAGES) - NOT_IN_DEBIAN)
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
-SEEDS = range(6)
+SEEDS = range(4)
 OTHER_HASH = {"std_msgs/msg/Char"}
 """Types whose hashes rosbags makes for `char`, which is `uint8` in ROS 2; test_ros2_types.py has the true ones."""
 

@@ -23,6 +23,7 @@ def kill(ros: RosSystem, process) -> None:
     process.wait()
 
 
+@pytest.mark.thorough
 def test_both_sides_connect_again_after_they_were_killed(ros, ros2, publisher):
     out, heard = publisher("/arm/joint_states", JointState), ros.listen("/arm/target", JointState)
     bridge, peer = ros2.bridge(), ros2.peer()
@@ -77,6 +78,7 @@ def test_wrong_parameters_end_the_bridge_with_one_line(ros, ros2, words, message
     assert len(fatal) == 1 and message in fatal[0] and "Traceback" not in ros.output(bridge)
 
 
+@pytest.mark.thorough
 def test_wrong_variable_ends_the_bridge_with_one_line(ros):
     bridge = ros.start(["rosrun", "rpbi_ros2", "ros2_bridge_node.py"], ROS_DOMAIN_ID="lab")
     assert bridge.wait(60.0) == 1
@@ -106,6 +108,7 @@ def test_hostile_messages_are_dropped_and_others_pass(ros, ros2):
     assert lines and all("failed" in line or "refused" in line for line in lines) and bridge.poll() is None
 
 
+@pytest.mark.thorough
 def test_unknown_type_is_named_and_others_pass(ros, ros2, publisher):
     publisher("/plan", JointTrajectoryControllerState)
     out = publisher("/arm/joint_states", JointState)
@@ -116,6 +119,7 @@ def test_unknown_type_is_named_and_others_pass(ros, ros2, publisher):
     assert ros.output(bridge).count(line) == 1 and "/plan" not in peer.topics()
 
 
+@pytest.mark.thorough
 def test_other_publisher_of_a_topic_is_named_once(ros, ros2, publisher):
     publisher("/arm/joint_states", JointState)
     bridge, peer = ros2.bridge(), ros2.peer()
@@ -125,6 +129,7 @@ def test_other_publisher_of_a_topic_is_named_once(ros, ros2, publisher):
     assert ros.output(bridge).count(text) == 1 and bridge.poll() is None
 
 
+@pytest.mark.thorough
 def test_requests_without_sense_are_refused(ros, ros2):
     bridge, peer = ros2.bridge(), ros2.peer()
     request, text = "/rpbi/ros2/request", "std_msgs/msg/String"

@@ -103,3 +103,42 @@ def test_trajectory_by_the_action_ends_at_its_goal(arm, ros, domain):
     wrong = {"trajectory": {"joint_names": ["elbow"], "points": [{"positions": [0.0], "time_from_start": {"sec": 1}}]}}
     status, result, _ = peer.act(action, kind, wrong)
     assert status == 6 and "elbow" in result["error_string"]
+
+
+@pytest.mark.thorough
+def test_launch_file_of_an_example_starts_the_bridge(ros, ros2):
+    command = ["roslaunch", "rpbi_examples", "run_kuka.launch", "headless:=true", "ros2:=true"]
+    ros.start(command, ROS_DOMAIN_ID=str(ros2.domain))
+    peer = ros2.peer()
+    peer.listen("/rpbi/kuka_lwr/joint_states", STATE)
+    wait_until(lambda: peer.count("/rpbi/kuka_lwr/joint_states"), "the robot is seen")
+
+
+@pytest.mark.thorough
+def test_companion_offers_the_standard_services_of_simulators(arm, ros, domain):
+    ros2 = Ros2(ros, domain, built(SUPPORT / "ros2/simulation_interfaces"))
+    ros2.bridge()
+    ros2.start(str(COMPANION))
+    peer = ros2.peer()
+
+    def call(name: str, /, **values) -> dict:
+        kind = "".join(word.title() for word in name.split("_"))
+        return peer.call(f"/rpbi/{name}", f"simulation_interfaces/srv/{kind}", values)
+
+    def is_done(name: str, /, **values) -> bool:
+        return call(name, **values)["result"]["result"] == 1
+
+    pose = {"position": {"x": 0.8, "y": 0.8, "z": 1.0}}
+    assert 0 in call("get_simulator_features")["features"]["features"]
+    state = call("get_simulation_state")
+    assert state["state"]["state"] == 1, state
+    assert is_done("set_simulation_state", state={"state": 2}) and is_done("set_simulation_state", state={"state": 2})
+    assert call("get_simulation_state")["state"]["state"] == 2
+    assert is_done("step_simulation", steps=10)
+    spawned = call("spawn_entity", name="crate", resource_string=BOX, initial_pose={"pose": pose})
+    assert spawned["entity_name"] == "crate", spawned
+    assert call("get_entities", filters={"filter": "cra.*"})["entities"] == ["crate"]
+    assert is_done("set_entity_state", entity="crate", state={"pose": pose})
+    assert is_done("delete_entity", entity="crate") and not is_done("delete_entity", entity="crate")
+    assert is_done("reset_simulation") and is_done("set_simulation_state", state={"state": 1})
+    assert not is_done("set_simulation_state", state={"state": 3})

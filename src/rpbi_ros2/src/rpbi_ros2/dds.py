@@ -141,6 +141,11 @@ class DdsReader:
         """Whether there are writers."""
         return self._reader.get_subscription_matched_status().current_count > 0
 
+    @property
+    def is_refused(self) -> bool:
+        """Whether there was a writer with another quality of service, such as best effort."""
+        return int(self._reader.get_requested_incompatible_qos_status().total_count) > 0
+
     def take(self) -> list[bytes]:
         """Returns messages that have arrived, in CDR; at most `MAX_TAKEN`."""
         taken: list[Any] = self._reader.take(MAX_TAKEN)

@@ -164,6 +164,7 @@ class IncomingTopic:
         self._warn = ThrottledWarning()
         self._publisher: rospy.Publisher | None = None
         self._held: deque[rospy.AnyMsg] = deque(maxlen=MAX_HELD)
+        self._has_refused = False
 
     @property
     def is_holding(self) -> bool:
@@ -190,7 +191,10 @@ class IncomingTopic:
             self._publisher.publish(self._held.popleft())
 
     def update(self) -> None:
-        """Closes the publisher in ROS 1 if nobody in ROS 2 writes to the topic any more."""
+        """Closes the publisher in ROS 1 if nobody in ROS 2 writes to the topic any more; names refused writers once."""
+        if self.reader.is_refused and not self._has_refused:
+            self._has_refused = True
+            rospy.logwarn(f"{self.name}: a publisher in ROS 2 has best effort, expected reliable: it is not read")
         if self._publisher is not None and not self.reader.is_matched:
             self._unpublish()
 

@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from worlds import iiwa
 
 from ros_pybullet_interface.msg import SimulationState
 from rpbi_data.bags.bag_reader import bag_to_dataframes
+from rpbi_data.episodes.folder import EpisodeFolder
 
 ODD = "<img src=x onerror=alert(1)>"
 
@@ -178,6 +180,38 @@ def test_recording_has_topics_and_label(viewer: Viewer, monkeypatch: pytest.Monk
         assert len(tables["/rpbi/iiwa/joint_states"])
     finally:
         bag.unlink()
+
+
+@pytest.mark.thorough
+def test_node_of_episodes_records_if_it_runs(viewer: Viewer, world: RosSystem, tmp_path: Path) -> None:
+    words = [f"_folder:={tmp_path}/demos", "_disk_reserve_mb:=1.0", f"_copy_from:=[{world.folder}]"]
+    node = world.start(["rosrun", "episodes", "record_node.py", *words])
+    try:
+        wait_until(lambda: "/record/start" in _services(), "the node of episodes runs")
+        viewer.set("Label", "good")
+        viewer.wait(lambda: _is_recorded(viewer), 60.0)
+        viewer.press("Set label")
+        viewer.wait_for_note("Label", "episode 0: good")
+        viewer.wait(lambda: viewer.find("End"))
+        viewer.press("End")
+        viewer.wait_for_note("Record", "episode 0 is complete")
+    finally:
+        os.killpg(node.pid, signal.SIGINT)
+        node.wait(60.0)
+    assert EpisodeFolder(tmp_path / "demos").read(0).label == "good"
+
+
+def _services() -> set[str]:
+    return {name for name, _ in rospy.get_master().getSystemState()[2][2]}
+
+
+def _is_recorded(viewer: Viewer) -> bool:
+    """Presses the button until the node of episodes is known to the view, and has received the world."""
+    if not any("episode 0 is being recorded" in text for _, text in viewer.notes):
+        viewer.press("End" if viewer.find("End") else "Record")
+        time.sleep(1.0)
+        return False
+    return True
 
 
 def test_markers_of_other_nodes_are_shown(viewer: Viewer, world: RosSystem) -> None:
