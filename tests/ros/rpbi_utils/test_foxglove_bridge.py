@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 import socket
 import struct
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -266,6 +268,36 @@ def stalled_viewer(bridge: Bridge, viewer: FoxgloveClient, name: str) -> Iterato
     stalled = StalledViewer(bridge.port, viewer.channels[name]["id"])
     yield
     stalled.close()
+
+
+@pytest.mark.thorough
+def test_viewers_that_come_and_leave_do_not_block_the_bridge(bridge, unharmed):
+    """With the log of foxglove-sdk, threads waited for each other forever."""
+    end_s = time.monotonic() + 15.0
+    done: list[int] = []
+
+    def come_and_leave(seed: int) -> None:
+        chance = random.Random(seed)
+        while time.monotonic() < end_s:
+            with suppress(ConnectionClosed), FoxgloveClient(bridge.port) as viewer:
+                for _ in range(10):
+                    viewer.subscribe(STATES, "/rpbi/state")
+                    viewer.publish(viewer.advertise(f"/many/{chance.randrange(5)}", "std_msgs/Int32"), bytes(4))
+                    viewer.op("subscribeParameterUpdates", parameterNames=["/a"])
+                    viewer.op("setParameters", parameters=[{"name": "/a", "value": chance.random()}], id="a")
+                    wrong = [{"id": 1000 + each, "channelId": 10**6 + each} for each in range(10)]
+                    viewer.op("subscribe", subscriptions=wrong)
+                    viewer.unsubscribe(STATES)
+                    viewer.unsubscribe("/rpbi/state")
+                    done.append(seed)
+
+    threads = [threading.Thread(target=come_and_leave, args=(seed,), daemon=True) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(120.0)
+    assert not any(thread.is_alive() for thread in threads) and len(done) > 40
+    rospy.delete_param("/a")
 
 
 def subscribers_of(name: str) -> list[str]:
