@@ -19,7 +19,10 @@ import re
 import threading
 import time
 import uuid
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from typing import Any
 
 import rclpy
 from rclpy.action import ActionServer, CancelResponse
@@ -49,16 +52,24 @@ QUANTITIES = ("positions", "velocities", "accelerations", "effort")
 class Simulator:
     """The simulator, which answers through its bridge."""
 
-    def __init__(self, node):
-        self._answers = {}
+    def __init__(self, node: Node) -> None:
+        self._answers: dict[str, queue.Queue[dict[str, Any]]] = {}
         group, qos = ReentrantCallbackGroup(), QoSProfile(depth=100)
         self._requests = node.create_publisher(String, "rpbi/ros2/request", qos)
         node.create_subscription(String, "rpbi/ros2/response", self._on_response, qos, callback_group=group)
 
-    def is_connected(self):
-        return self._requests.get_subscription_count() > 0
+    def is_connected(self) -> bool:
+        """Returns whether a bridge listens."""
+        return bool(self._requests.get_subscription_count())
 
-    def call(self, function, on_feedback=None, is_cancelled=None, /, **arguments):
+    def call(
+        self,
+        function: str,
+        on_feedback: Callable[[Any], None] | None = None,
+        is_cancelled: Callable[[], bool] | None = None,
+        /,
+        **arguments: Any,
+    ) -> dict[str, Any]:
         """Calls a function of the simulator. Returns its answer, which has `success` and `message`."""
         end = time.monotonic() + CONNECT_S
         while not self.is_connected():
@@ -90,10 +101,10 @@ class Simulator:
         finally:
             del self._answers[number]
 
-    def _send(self, number, name, arguments):
+    def _send(self, number: str, name: str, arguments: dict[str, Any]) -> None:
         self._requests.publish(String(data=json.dumps({"id": number, "call": name, "arguments": arguments})))
 
-    def _on_response(self, message):
+    def _on_response(self, message: String) -> None:
         answer = json.loads(message.data)
         answers = self._answers.get(answer.get("id"))
         if answers:
@@ -103,31 +114,31 @@ class Simulator:
 class Companion(Node):
     """Node with the services and actions."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__("rpbi_companion")
         self._group = ReentrantCallbackGroup()
         for name, default in PARAMETERS.items():
             self.declare_parameter(name, default)
         self.simulator = Simulator(self)
         for name, parameters in TRIGGERS.items():
-            self._serve(Trigger, name, lambda _, answer, of=(name, parameters): self._trigger(answer, *of))
+            self._serve(Trigger, name, partial(self._trigger, name, parameters))
         try:
             self._types = import_module("simulation_interfaces.srv")
             self._messages = import_module("simulation_interfaces.msg")
             self._serve_standard()
         except ImportError:
             self.get_logger().info("simulation_interfaces is not installed: services are of std_srvs only")
-        self._actions = {}
+        self._actions: dict[str, ActionServer] = {}
         try:
             self._action_type = import_module("control_msgs.action").FollowJointTrajectory
             threading.Thread(target=self._watch_robots, daemon=True).start()
         except ImportError:
             self.get_logger().info("control_msgs is not installed: no action follow_joint_trajectory")
 
-    def _serve(self, service_type, name, callback):
+    def _serve(self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
         self.create_service(service_type, f"rpbi/{name}", callback, callback_group=self._group)
 
-    def _trigger(self, answer, name, parameters):
+    def _trigger(self, name: str, parameters: tuple[str, ...], _: Any, answer: Any) -> Any:
         values = {each: self.get_parameter(each).value for each in parameters}
         values = {each: value if isinstance(value, (str, int)) else list(value) for each, value in values.items()}
         if name == "spawn" and values["pose"] == PARAMETERS["pose"]:
@@ -138,7 +149,7 @@ class Companion(Node):
 
     # --- Services of simulation_interfaces
 
-    def _serve_standard(self):
+    def _serve_standard(self) -> None:
         served = {
             "GetSimulatorFeatures": self._features, "GetEntities": self._entities, "SpawnEntity": self._spawn,
             "DeleteEntity": self._delete, "SetEntityState": self._set_entity, "ResetSimulation": self._reset,
@@ -148,13 +159,13 @@ class Companion(Node):
             if hasattr(self._types, name):
                 self._serve(getattr(self._types, name), re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(), callback)
 
-    def _finish(self, response, answer):
+    def _finish(self, response: Any, answer: dict[str, Any]) -> Any:
         result = self._messages.Result
         response.result.result = result.RESULT_OK if answer["success"] else result.RESULT_OPERATION_FAILED
         response.result.error_message = "" if answer["success"] else answer["message"]
         return response
 
-    def _features(self, _, response):
+    def _features(self, _: Any, response: Any) -> Any:
         known = self._messages.SimulatorFeatures
         names = (
             "SPAWNING DELETING SPAWN_RESOURCE_STRING ENTITY_STATE_SETTING SIMULATION_RESET SIMULATION_RESET_STATE "
@@ -164,13 +175,13 @@ class Companion(Node):
         response.features.spawn_formats = ["urdf", "yaml"]
         return response
 
-    def _entities(self, request, response):
+    def _entities(self, request: Any, response: Any) -> Any:
         answer = self.simulator.call("list")
         pattern = re.compile(request.filters.filter)
         response.entities = [name for name in answer.get("objects", ()) if pattern.search(name)]
         return self._finish(response, answer)
 
-    def _spawn(self, request, response):
+    def _spawn(self, request: Any, response: Any) -> Any:
         resource = getattr(request, "entity_resource", request)
         name = request.name or f"entity_{uuid.uuid4().hex[:8]}"
         pose = pose_of(request.initial_pose.pose)
@@ -178,26 +189,26 @@ class Companion(Node):
         response.entity_name = name if answer["success"] else ""
         return self._finish(response, answer)
 
-    def _delete(self, request, response):
+    def _delete(self, request: Any, response: Any) -> Any:
         return self._finish(response, self.simulator.call("remove", name=request.entity))
 
-    def _set_entity(self, request, response):
+    def _set_entity(self, request: Any, response: Any) -> Any:
         answer = self.simulator.call("move", name=request.entity, pose=pose_of(request.state.pose))
         return self._finish(response, answer)
 
-    def _reset(self, _, response):
+    def _reset(self, _: Any, response: Any) -> Any:
         return self._finish(response, self.simulator.call("reset"))
 
-    def _step(self, request, response):
+    def _step(self, request: Any, response: Any) -> Any:
         return self._finish(response, self.simulator.call("step", steps=request.steps))
 
-    def _get_state(self, _, response):
+    def _get_state(self, _: Any, response: Any) -> Any:
         answer = self.simulator.call("state")
         states = self._messages.SimulationState
         response.state.state = states.STATE_PLAYING if answer.get("running") else states.STATE_PAUSED
         return self._finish(response, answer)
 
-    def _set_state(self, request, response):
+    def _set_state(self, request: Any, response: Any) -> Any:
         """Stopped is paused at the start of the world."""
         states, state = self._messages.SimulationState, request.state.state
         calls = {
@@ -213,7 +224,7 @@ class Companion(Node):
 
     # --- Actions
 
-    def _watch_robots(self):
+    def _watch_robots(self) -> None:
         """Makes an action for each robot that appears."""
         while rclpy.ok():
             if self.simulator.is_connected():
@@ -222,7 +233,7 @@ class Companion(Node):
                         self._actions[robot] = self._serve_action(robot)
             time.sleep(LIST_S)
 
-    def _serve_action(self, robot):
+    def _serve_action(self, robot: str) -> ActionServer:
         self.get_logger().info(f"follow_joint_trajectory of {robot}")
         return ActionServer(
             self,
@@ -233,10 +244,10 @@ class Companion(Node):
             callback_group=self._group,
         )
 
-    def _follow(self, robot, goal):
+    def _follow(self, robot: str, goal: Any) -> Any:
         request = goal.request
 
-        def on_feedback(given):
+        def on_feedback(given: dict[str, Any]) -> None:
             feedback = self._action_type.Feedback(joint_names=given["joint_names"])
             feedback.header.stamp = self.get_clock().now().to_msg()
             for name in ("desired", "actual", "error"):
@@ -268,23 +279,26 @@ class Companion(Node):
         return self._action_type.Result(error_code=code, error_string=answer["message"])
 
 
-def pose_of(pose):
+def pose_of(pose: Any) -> list[float]:
     """Returns position and quaternion x, y, z, w; a quaternion of zeros is no rotation."""
     at, turn = pose.position, pose.orientation
     quat = [turn.x, turn.y, turn.z, turn.w]
     return [at.x, at.y, at.z, *(quat if any(quat) else [0.0, 0.0, 0.0, 1.0])]
 
 
-def point_of(point):
+def point_of(point: Any) -> dict[str, Any]:
+    """Returns a point of a trajectory as a dictionary."""
     values = {name: list(getattr(point, name)) for name in QUANTITIES}
     return {**values, "time_from_start_s": Duration.from_msg(point.time_from_start).nanoseconds / 1e9}
 
 
-def tolerance_of(each):
+def tolerance_of(each: Any) -> dict[str, Any]:
+    """Returns the tolerance of a joint as a dictionary."""
     return {"name": each.name, **{name: getattr(each, name) for name in ("position", "velocity", "acceleration")}}
 
 
-def main():
+def main() -> None:
+    """Runs the node."""
     rclpy.init()
     companion = Companion()
     executor = MultiThreadedExecutor(THREADS)
