@@ -115,6 +115,7 @@ def test_first_command_from_ros2_is_not_lost(ros, ros2):
     for topic, type_name in (("/arm/target", STATE), ("/base/cmd_vel", "geometry_msgs/msg/Twist")):
         peer.write(topic, type_name)
         wait_until(lambda topic=topic: peer.readers(topic), "the bridge reads")
+    time.sleep(1.0)  # Fast DDS names the reader some ms before the reader knows the publisher
     peer.publish("/arm/target", {"name": JOINTS, "position": [0.1 * i for i in range(7)]})
     peer.publish("/base/cmd_vel", {"linear": {"x": 0.5}, "angular": {"z": -1.0}})
     (target,), (twist,) = heard.wait_for(1), twists.wait_for(1)
