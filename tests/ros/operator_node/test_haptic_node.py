@@ -126,9 +126,8 @@ def test_touch_receives_zero_when_the_simulator_or_node_ends(ros):
     """The driver holds the last force for ever, so that silence on our side would not do."""
     rospy.set_param("/touch_emulator", {"depth": 0.03})
     ros.start(["rosrun", "operator_node", "touch_emulator.py"])
-    felt = ros.listen("/phantom/felt", Vector3)
+    felt, joy = ros.listen("/phantom/felt", Vector3), ros.listen("/joy", Joy)
     process, state = start_haptic_node(ros, "touch", {}, energy_allowance_j=0.1, energy_refill_w=0.1)
-    joy = ros.listen("/joy", Joy)
     wrenches = Wrenches(ros, 2.0)
     wait_until(lambda: strongest_n(felt.messages) > 1.0, "the hand feels the force")
     wait_until(lambda: min(each.axes[2] for each in joy.wait_for()) < -0.1, "the handle goes down")

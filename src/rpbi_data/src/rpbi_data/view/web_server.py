@@ -58,7 +58,7 @@ FRAMES = "frame-ancestors 'self' http://localhost:* http://127.0.0.1:*"
 
 _log = logging.getLogger(__name__)
 _silent = logging.getLogger(f"{__name__}.websockets")
-_silent.setLevel(logging.CRITICAL + 1)  # a faulty client is no error of this program
+_silent.setLevel(logging.CRITICAL)  # a faulty client is no error of this program; rospy reports only known levels
 _opening = threading.Lock()
 
 
