@@ -28,7 +28,18 @@ PROJECT = SETTINGS["project"]
 PACKAGES = SETTINGS["tool"]["hatch"]["build"]["targets"]["wheel"]["hooks"]["custom"]["packages"]
 REQUIREMENTS = [ROOT / "requirements/base.txt", *sorted(ROOT.glob("requirements/extras/*.txt"))]
 WHEEL = ROOT / f"out/rpbi-{version(ROOT)}-py3-none-any.whl"
-OF_EXTRAS = {"pinocchio", "hppfcl", "daqp", "casadi", "pytracik", "viser", "trimesh", "fast_simplification"}
+OF_EXTRAS = {
+    "pinocchio",
+    "hppfcl",
+    "hpp-fcl",
+    "daqp",
+    "casadi",
+    "pytracik",
+    "viser",
+    "msgspec",
+    "trimesh",
+    "fast_simplification",
+}
 OF_DEBIAN = {"PyKDL", "pytest"}
 LACKING = OF_EXTRAS | OF_DEBIAN
 """Libraries that `installed` lacks: of other extras, and those of Debian that are for some solvers and for tests."""
