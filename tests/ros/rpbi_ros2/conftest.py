@@ -1,4 +1,4 @@
-"""What tests of the bridge share: a domain of their own, and ROS 2 in it."""
+"""Common parts of the tests of the bridge: a DDS domain for each test, and ROS 2 programs in it."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from io import BytesIO
@@ -24,8 +25,9 @@ QUEUE_SIZE = 1000
 """Messages that wait in ROS 1, in each direction: 1 s of a topic at 1 kHz."""
 BUFFER_BYTES = 1 << 22
 """Bytes that rospy reads at once; images at 30 Hz take much time with the usual 64 KiB."""
-MAX_HELD = 100
-"""Messages from ROS 2 that are kept until a subscriber in ROS 1 is connected."""
+MAX_HELD, MAX_HELD_S = 100, 5.0
+"""Messages from ROS 2 that are kept until a subscriber in ROS 1 is connected, and for how long [s]: an old command must
+not move a robot whose node starts again later."""
 STATIC_TF = "/tf_static"
 Learn = Callable[[str, Mapping[str, str]], None]
 
@@ -163,7 +165,8 @@ class IncomingTopic:
         self.name, self.kind, self.reader = name, kind, reader
         self._warn = ThrottledWarning()
         self._publisher: rospy.Publisher | None = None
-        self._held: deque[rospy.AnyMsg] = deque(maxlen=MAX_HELD)
+        self._held: deque[tuple[float, rospy.AnyMsg]] = deque(maxlen=MAX_HELD)
+        """Messages with the times of their arrival [s]."""
         self._has_refused = False
 
     @property
@@ -172,7 +175,10 @@ class IncomingTopic:
         return bool(self._held)
 
     def forward(self) -> None:
-        """Publishes all messages that have arrived, if a subscriber in ROS 1 is connected; otherwise keeps the last."""
+        """Publishes all messages that have arrived, if a subscriber in ROS 1 is connected; otherwise keeps the last.
+
+        Messages older than `MAX_HELD_S` are dropped.
+        """
         for cdr in self.reader.take():
             message = rospy.AnyMsg()
             try:
@@ -180,7 +186,10 @@ class IncomingTopic:
             except ValueError as error:
                 self._warn(self.name, f"message from ROS 2 refused: {error}")
                 continue
-            self._held.append(message)
+            self._held.append((time.monotonic(), message))
+        while self._held and time.monotonic() - self._held[0][0] > MAX_HELD_S:
+            self._held.popleft()
+            self._warn(self.name, f"message from ROS 2 dropped: no subscriber in ROS 1 within {MAX_HELD_S:g} s")
         if not self._held:
             return
         if self._publisher is None:
@@ -188,7 +197,7 @@ class IncomingTopic:
                 self.name, self.kind.message_class, queue_size=QUEUE_SIZE, tcp_nodelay=True
             )
         while self._held and self._publisher.get_num_connections():
-            self._publisher.publish(self._held.popleft())
+            self._publisher.publish(self._held.popleft()[1])
 
     def update(self) -> None:
         """Closes the publisher in ROS 1 if nobody in ROS 2 writes to the topic any more; names refused writers once."""
