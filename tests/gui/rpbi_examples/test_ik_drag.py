@@ -94,6 +94,7 @@ def mouse(example, screen):
         raise TimeoutError("\n".join([str(error), *map(str, screen.windows()), *said])) from None
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "way",
     [

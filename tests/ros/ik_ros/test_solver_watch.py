@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import signal
 
+import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ik_nodes import start_setup, start_solver
 from ros_system import wait_until
 
 
+@pytest.mark.thorough
 def test_a_stopped_and_a_killed_solver_are_reported(ros):
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
     solver = start_solver(ros)

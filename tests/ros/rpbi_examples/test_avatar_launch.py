@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from workplace import Port
 
 
+@pytest.mark.thorough
 def test_the_avatar_walks(ros, own_tf):
     port = Port()
     ros.start(["roslaunch", "rpbi_examples", "avatar.launch", "headless:=true", f"port:={port.number}"])

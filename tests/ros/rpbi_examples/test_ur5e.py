@@ -75,6 +75,7 @@ def test_simulated_and_real_tool_reach_the_target(ros: RosSystem, position) -> N
     wait_until(tracks, "the arm tracks the target")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("guard", [True, False])
 def test_guard_keeps_the_real_tool_off_the_floor(ros: RosSystem, position, guard: bool) -> None:
     driver = ros.listen("/stand_in/driver_state", DriverState)

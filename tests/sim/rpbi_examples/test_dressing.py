@@ -179,6 +179,7 @@ def as_a_squeeze(since_s: float, beyond_m: float) -> float:
     return SQUEEZE_N
 
 
+@pytest.mark.thorough
 def test_robot_backs_off_from_a_force_and_continues_afterwards(tmp_path):
     found = dress_pressed(tmp_path, SNAG_LIMIT_N, [ABOVE], as_a_thread)
     assert found.back_m > 0.015
@@ -193,6 +194,7 @@ def test_without_a_limit_the_same_force_grows_beyond_it(tmp_path):
     assert found.peak_n > 3.0 * SNAG_LIMIT_N and found.back_m < 0.005 and found.is_done
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "limit_n, backs_off", ((FORCE_LIMIT_N, True), pytest.param(1e6, False, marks=pytest.mark.thorough))
 )

@@ -108,6 +108,7 @@ def models(found) -> dict[int, cKDTree]:
     return {each["id"]: surface(found.folder / f"models/obj_{each['id']:06d}.ply") for each in found.coco["categories"]}
 
 
+@pytest.mark.thorough
 def test_depth_points_lie_on_the_models_at_their_poses(found, models):
     worst = 0.0
     for image, label, pose, _ in found.each():

@@ -7,6 +7,7 @@ from page_blocks import blocks_of
 from page_runs import run_blocks
 
 
+@pytest.mark.thorough
 def test_code_blocks_of_the_page_give_the_documented_results(tmp_path):
     printed = run_blocks(blocks_of("docs/mpc.md", "python"), tmp_path)
     place, counts, pushed, is_cheaper = "".join(printed).splitlines()[-4:]

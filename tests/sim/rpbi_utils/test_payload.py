@@ -122,6 +122,7 @@ def arm(tmp_path: Path) -> Iterator[Arm]:
     arm.world.close()
 
 
+@pytest.mark.thorough
 def test_identified_payload_has_accurate_mass_and_centre_without_remaining_wrench(arm):
     samples = []
     for tilt in TILTS:

@@ -165,6 +165,7 @@ def seen_points(frame, generator):
         yield link, u[free], v[free], depth_m[free]
 
 
+@pytest.mark.thorough
 def test_images_of_a_frame_share_a_due_ticks_stamp(frames, listeners):
     stamps = [set(listeners[topic].stamps_ns) for topic in TOPICS]
     # A slow listener misses images, the queues being short

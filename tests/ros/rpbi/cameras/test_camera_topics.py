@@ -66,6 +66,7 @@ def test_stopped_viewer_holds_up_neither_physics_nor_other_viewers(ros, placed):
     assert set(np.diff(joint_states.stamps_ns)) == {20_000_000}
 
 
+@pytest.mark.thorough
 def test_camera_follows_the_namespace_and_the_remappings_of_its_simulator(ros, placed):
     rospy.set_param("/use_sim_time", True)
     rospy.set_param("/left/simulator/config", arm_world(ros))

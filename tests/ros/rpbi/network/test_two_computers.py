@@ -72,6 +72,7 @@ def reports(ros_of_module: RosSystem, both: TwoComputers) -> Reports:
     return _operator(ros_of_module, both, both.first.cable_ip)
 
 
+@pytest.mark.thorough
 def test_topics_services_and_simulated_time_come_to_the_other_computer(both: TwoComputers, reports: Reports) -> None:
     assert "xmlrpc reply from http://10.77.0.2:" in both.on(
         both.first, "rosnode", "ping", "-c1", "/ros_pybullet_interface"
@@ -82,6 +83,7 @@ def test_topics_services_and_simulated_time_come_to_the_other_computer(both: Two
     assert 0 < int(clock.split("secs:")[1].split()[0]) < 1e6
 
 
+@pytest.mark.thorough
 def test_connections_recover_by_themselves_after_a_network_failure(both: TwoComputers, reports: Reports) -> None:
     both.plug(False)
     time.sleep(OUT_S)
@@ -104,6 +106,7 @@ def test_targets_with_20_ms_of_jitter_move_the_robot(
     assert lines()[-1]["lag_s"] < 0.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("side", ["first", pytest.param("second", marks=pytest.mark.thorough)])
 def test_a_guard_on_either_side_lets_a_swing_through(ros_of_module: RosSystem, both: TwoComputers, side: str) -> None:
     targets = f"/{side}/targets"

@@ -10,12 +10,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from ros_system import support_on_path
 
 ROBUSTNESS = Path(__file__).resolve().parents[4] / "dev/robustness"
 FIRST_SEED = 5016
 
 
+@pytest.mark.thorough
 def test_a_hostile_bag_is_taken_or_refused_in_words(tmp_path: Path) -> None:
     seeds = ["--first", str(FIRST_SEED), "--count", "8"]
     environment = {**os.environ, **support_on_path(), "TMPDIR": str(tmp_path)}

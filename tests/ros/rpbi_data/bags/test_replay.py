@@ -134,6 +134,7 @@ def bag(ros_master, tmp_path_factory):
         ros.close()
 
 
+@pytest.mark.thorough
 @pytest.mark.quick
 def test_a_session_is_the_same_in_a_new_process(bag):
     environment = {**os.environ, "ROS_MASTER_URI": "http://127.0.0.1:1"}  # it needs none

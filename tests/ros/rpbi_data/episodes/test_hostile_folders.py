@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from ros_system import support_on_path
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -53,6 +54,7 @@ def _run(*command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, *command], capture_output=True, text=True, env=environment, cwd=folder)
 
 
+@pytest.mark.thorough
 def test_hostile_folders_are_taken_or_refused_in_words(tmp_path: Path) -> None:
     program = str(ROOT / "dev/robustness/episode_folders.py")
     done = _run(program, "--first", "20", "--count", "20", "--readers", *READERS, folder=tmp_path)

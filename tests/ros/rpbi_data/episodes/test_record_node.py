@@ -215,6 +215,7 @@ def test_session_of_the_page_works_with_resets_keys_and_buttons(
     assert code == 1 and f"{urdf.name}, the copy of" in text and "differs at tick" in text
 
 
+@pytest.mark.thorough
 def test_a_second_recorder_leaves_the_running_episode_alone(ros: Any, tmp_path: Path) -> None:
     session = _Session(ros, tmp_path)
     folder = session.folder
@@ -232,6 +233,7 @@ def test_a_second_recorder_leaves_the_running_episode_alone(ros: Any, tmp_path: 
     assert "expected a label of at most" in ros.call("/second/label", SetString, "x" * 101).message
 
 
+@pytest.mark.thorough
 def test_node_repairs_partial_episodes_and_names_a_full_disk(ros: Any, tmp_path: Path) -> None:
     session = _Session(ros, tmp_path)
     session.move(0.2)

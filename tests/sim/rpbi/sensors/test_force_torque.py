@@ -382,6 +382,7 @@ def test_mass_that_is_changed_is_weighed(world_of):
     assert np.linalg.norm(after[:3]) == pytest.approx(2 * np.linalg.norm(before[:3]), rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_noise_and_bias_are_as_configured_over_100_000_samples(world_of):
     sigma, bias = [0.5, 0.2, 0.1, 0.02, 0.01, 0.05], [1.0, -2.0, 3.0, 0.1, -0.2, 0.3]
     sensor = {

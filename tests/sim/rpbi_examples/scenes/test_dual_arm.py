@@ -17,6 +17,7 @@ def env():
     found.close()
 
 
+@pytest.mark.thorough
 def test_a_policy_that_moves_both_hands_succeeds(env):
     *_, (observation, _, has_ended, _, info) = imitate(env, 3)
     scene = env.task.scene

@@ -1,5 +1,6 @@
 """The command `test`."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -42,5 +43,6 @@ def test(*words: Annotated[str, WORDS]) -> int:
     is_serial = any(word.startswith(("-n", "--numprocesses")) or word.endswith("no:xdist") for word in words)
     chosen = "--skip-missing-extras" if is_chosen else str(root / "tests")
     options = ("-c", str(root / "pyproject.toml"), "--rootdir", str(root), *(() if is_serial else PARALLEL))
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in nodes: workers use all processors already
     sys.argv = ["pytest", *options, *words, chosen]
     return int(pytest.console_main())
