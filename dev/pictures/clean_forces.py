@@ -15,8 +15,10 @@ from matplotlib.axes import Axes
 from plots import legend_below, new_figure, save
 from pushes import COMPLIANT, PLANE, Force, pushed
 
-BEFORE, AFTER, INK = "#c0392b", "#e8731a", "#22333f"
-"""Colours of a push without and with a setting, and of other quantities."""
+from custom_ros_tools.plot_style import BLUE, INK, ORANGE
+
+BEFORE, AFTER = ORANGE, BLUE
+"""Colours of a push without and with a setting."""
 TOP_N = 25.0
 """Largest force in plots of whole pushes; first touches are higher [N]."""
 RUN_UP_M = 0.035

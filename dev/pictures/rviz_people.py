@@ -54,7 +54,7 @@ BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 
 def telepresence(path: Path) -> None:
     """Draws the sleeve on the forearm and past the elbow, while it presses on the arm."""
-    with Stage(600, 560) as stage:
+    with Stage(620, 460) as stage:
         stage.launch("telepresence.launch", "seed:=3")
         frames, surface = Frames(), Newest("rpbi/sleeve/surface", Marker)
         force, arrows = Newest("telepresence/force", Float64), Newest("rpbi/human/contacts/arrows", MarkerArray)
@@ -76,7 +76,7 @@ def telepresence(path: Path) -> None:
         def presses() -> bool:
             return bool(force.message.data > SHOWN_N and forces())
 
-        view = Orbit(1.3, (0.4, -0.22, 1.3), 0.25, 0.85)
+        view = Orbit(0.95, (0.4, -0.2, 1.27), 0.45, 0.85)
         stage.rviz(RVIZ / "telepresence.rviz", **view.properties)
         wait_until(lambda: force.message, "the robot moves")
         stop_when(stage, lambda: -0.25 < past_elbow() < -0.08 and presses())
@@ -161,8 +161,9 @@ def guard_rviz(path: Path) -> None:
         remaps = f"joint_states/command:={states}/target", f"joint_states/measured:={states}"
         stage.start(["rosrun", "safe_robot", "safe_robot_node.py", "__name:=guard", *remaps])
         status, targets = Newest("robot_safety/status", Status), rospy.Publisher("joint_states/target", JointState)
-        view = Orbit(0.7, (0.0, 0.0, 0.2), 0.3, 4.9)
-        stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", {"TF": None}, **view.properties)
+        view = Orbit(1.0, (0.1, 0.0, 0.27), 0.55, 5.2)
+        shown = {"TF": None, "Guard": {"Namespaces": {"self_collision": False}}}
+        stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", shown, **view.properties)
         names, start = measured.message.name, np.array(measured.message.position)
         downwards, moved = np.array([name == "lwr_arm_1_joint" for name in names]), 0.0
 
@@ -179,7 +180,7 @@ def guard_rviz(path: Path) -> None:
             moved += SPEED * PERIOD_S
         stage.stop_world()
         scene, tip = stage.still_picture(), frames.wait_for(TIP)
-    label(scene, "the guard keeps the margin of 100 mm", (640, 480), view.pixel(tip - (0.0, 0.0, 0.08), scene))
+    label(scene, "the guard halted the arm at the margin", (640, 330), view.pixel(tip - (0.0, 0.0, 0.07), scene))
     write_png(path, scene)
 
 
