@@ -50,7 +50,6 @@ START_M_S, CHANGE_S, SLIDES_S = 2.0, 0.1, 1.0
 """First speed of the sliding box [m/s], time of the change of its friction, and time that the plot shows [s]."""
 EPISODES, EPISODE_S = 20, 2.0
 """Number of the farm's episodes, and their longest duration [s]."""
-SOLVERS = ("kdl", "pybullet", "tasks", "trac_ik")
 IK_HZ, SHOWN_S, SETTLES_S = 100.0, 20.0, 3.0
 """Problems in a second, time that the plot shows, and time in which the arm moves to the start of the figure [s]."""
 
@@ -79,14 +78,15 @@ def draw_streams(path: Path) -> None:
 
 
 def draw_ik_errors(path: Path) -> None:
-    """Draws the distance between tip and moving target over time, for four solvers."""
-    figure, axes = new_figure(len(SOLVERS), 1, (9.0, 5.6), sharex=True, sharey=True)
-    for name, each in zip(SOLVERS, axes):
+    """Draws the distance between tip and moving target over time, for three solvers with equal errors, and trac_ik."""
+    figure, axes = new_figure(2, 1, (9.0, 5.0), sharex=True, height_ratios=(1.0, 1.4))
+    for name, width, style in (("kdl", 4.5, "-"), ("pybullet", 2.0, "-"), ("tasks", 1.6, ":"), ("trac_ik", 1.0, "-")):
         times_s, distances_mm = _followed(name)
-        each.plot(times_s, distances_mm, lw=1.2)
-        middle, largest = np.median(distances_mm), distances_mm.max()
-        each.set_title(f"{name}: median {middle:.1f} mm, largest {largest:.1f} mm")
-        each.set(ylim=(0.0, 10.0), xlim=(0.0, SHOWN_S))
+        label = f"{name}: median {np.median(distances_mm):.1f} mm, largest {distances_mm.max():.1f} mm"
+        axes[name == "trac_ik"].plot(times_s, distances_mm, style, lw=width, label=label)
+    for each in axes:
+        each.set(ylim=(0.0, None), xlim=(0.0, SHOWN_S))
+        each.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.0, fontsize=10)
     figure.supylabel("distance between tip and target [mm]", fontsize=11, color=INK)
     axes[-1].set_xlabel("time since the target began to move [s]")
     save(figure, path)
@@ -148,7 +148,7 @@ def draw_farm(path: Path) -> None:
     text = (ROOT / "docs/farm.md").read_text(encoding="utf-8")
     scope: dict[str, Any] = {}
     exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], scope)  # type: ignore[index]  # the page's own policy
-    figure, (axes,) = new_figure(1, 1, (8.6, 4.6))
+    figure, (axes,) = new_figure(1, 1, (7.0, 5.6))
     for number in range(EPISODES):
         world = World.from_file("{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml")
         policy, label = scope["Push"](world, np.random.default_rng(number)), None

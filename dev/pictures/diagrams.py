@@ -144,9 +144,13 @@ def computers(path: Path) -> None:
     drawing.box(Box(16, 16, 330, 268), PLAIN, "robot PC, 192.168.1.10", centred=False)
     drawing.box(Box(454, 16, 330, 268), PLAIN, "your computer, 192.168.1.20", centred=False)
     master = drawing.box(Box(36, 60, 290, 62), DATA, "roscore: the master", ["TCP port 11311"])
-    driver = drawing.box(Box(36, 180, 290, 84), PEOPLE, "driver, sensors", ["publish measured states,", "read commands"])
+    driver = drawing.box(
+        Box(36, 180, 290, 84), PEOPLE, "driver, sensors", ["publish measured states,", "read commands"]
+    )
     nodes = drawing.box(Box(474, 60, 290, 62), GUARD, "guard, RViz, your nodes", ["two TCP ports for each node"])
-    world = drawing.box(Box(474, 180, 290, 84), SIMULATOR, "simulator", ["publishes simulated states,", "reads targets"])
+    world = drawing.box(
+        Box(474, 180, 290, 84), SIMULATOR, "simulator", ["publishes simulated states,", "reads targets"]
+    )
     drawing.arrow(nodes.left(), master.right(), dashed=True)
     drawing.text((400, 62), "names,")
     drawing.text((400, 80), "addresses")
@@ -166,7 +170,9 @@ def ros2(path: Path) -> None:
     world = drawing.box(Box(32, 60, 170, 158), SIMULATOR, "simulator, nodes", ["topics of ROS 1,", "services"])
     bridge = drawing.box(Box(250, 60, 170, 158), GUARD, "the bridge", ["rpbi_ros2,", "Cyclone DDS"])
     nodes = drawing.box(Box(550, 60, 218, 66), PEOPLE, "rclpy, rclcpp, RViz 2", ["the same names of topics"])
-    companion = drawing.box(Box(550, 144, 218, 74), PEOPLE, "the companion", ["services and actions", "of the simulator"])
+    companion = drawing.box(
+        Box(550, 144, 218, 74), PEOPLE, "the companion", ["services and actions", "of the simulator"]
+    )
     drawing.arrow(world.right(), bridge.left(), both=True)
     for other in (nodes, companion):
         drawing.arrow((bridge.right()[0], other.left()[1]), other.left(), both=True)

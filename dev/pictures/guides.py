@@ -191,7 +191,7 @@ def draw_python(path: Path) -> None:
     world = World.from_file(f"{CONFIGS}/basic_example_kuka_lwr/config.yaml")
     world.put("camera/pose", looking_at([-0.32, -2.05, 2.2], target=[0.1, 0.0, 0.3]))
     images = CameraImages(world)
-    write_png(path, Image.fromarray(images.frame("camera").colour), dither=True)
+    Image.fromarray(images.frame("camera").colour).save(path, optimize=True)
     images.close()
     world.close()
 
@@ -206,7 +206,7 @@ def draw_tutorial_colour(path: Path) -> None:
             (Path(folder) / name).write_text(text, encoding="utf-8")
         world = World.from_file(f"{folder}/world.yaml")
         images = CameraImages(world)
-        write_png(path, Image.fromarray(images.frame("camera").colour), dither=True)
+        Image.fromarray(images.frame("camera").colour).save(path, optimize=True)
         images.close()
         world.close()
 

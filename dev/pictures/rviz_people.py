@@ -46,6 +46,8 @@ RESTS_S = 3.0
 """Time after which the arm rests on the box [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
+PART_PX = 400
+"""Rows and columns of the part of RViz's view that shows one of two worlds [px]."""
 CAMERA_YAW_RAD = -0.8
 """Direction of the camera as seen from the avatar [rad]."""
 BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
@@ -128,7 +130,7 @@ def human_interaction(path: Path) -> None:
         force = Newest("haptics/force", WrenchStamped)
         handle = place("^Virtual haptic device$")
         wait_until(lambda: force.message, "the device runs")
-        view = Orbit(0.9, (0.0, 0.0, 0.25), 0.25, 5.2)
+        view = Orbit(0.85, (0.02, 0.0, 0.22), 0.55, 5.2)
         stage.rviz(RVIZ / "human_interaction.rviz", {"TF": None, "Guard": None}, **view.properties)
         rviz = place("RViz")
         xdotool("windowraise", handle.number, "mousemove", (handle.left + handle.right) // 2, handle.upper + 210)
@@ -161,7 +163,7 @@ def guard_rviz(path: Path) -> None:
         remaps = f"joint_states/command:={states}/target", f"joint_states/measured:={states}"
         stage.start(["rosrun", "safe_robot", "safe_robot_node.py", "__name:=guard", *remaps])
         status, targets = Newest("robot_safety/status", Status), rospy.Publisher("joint_states/target", JointState)
-        view = Orbit(1.0, (0.1, 0.0, 0.27), 0.55, 5.2)
+        view = Orbit(0.95, (0.1, 0.0, 0.25), 0.55, 5.2)
         shown = {"TF": None, "Guard": {"Namespaces": {"self_collision": False}}}
         stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", shown, **view.properties)
         names, start = measured.message.name, np.array(measured.message.position)
@@ -180,7 +182,9 @@ def guard_rviz(path: Path) -> None:
             moved += SPEED * PERIOD_S
         stage.stop_world()
         scene, tip = stage.still_picture(), frames.wait_for(TIP)
-    label(scene, "the guard halted the arm at the margin", (640, 330), view.pixel(tip - (0.0, 0.0, 0.07), scene))
+    label(
+        scene, "the guard halted the arm 100 mm above the table", (235, 568), view.pixel(tip - (0.0, 0.0, 0.09), scene)
+    )
     write_png(path, scene)
 
 
@@ -189,7 +193,7 @@ def table_world(folder: Path) -> dict[str, object]:
     size = {"shapeType": "GEOM_BOX", "halfExtents": [0.2, 0.14, 0.01]}
     table = {
         "name": "table",
-        "createVisualShape": {**size, "rgbaColor": [0.75, 0.62, 0.45, 1.0]},
+        "createVisualShape": {**size, "rgbaColor": [0.95, 0.92, 0.85, 1.0]},
         "createCollisionShape": size,
         "basePosition": [-0.05, 0.0, 0.01],
     }
@@ -209,7 +213,7 @@ def avatar_walking(path: Path) -> None:
         stage.launch("avatar.launch")
         frames, world = Frames("rpbi/human/Pelvis"), Frames("rpbi/world")
         frames.wait_for("rpbi/human/RightHand")
-        view = Orbit(2.9, (0.1, 0.0, -0.05), 0.2, CAMERA_YAW_RAD)
+        view = Orbit(2.5, (0.1, 0.0, -0.05), 0.25, CAMERA_YAW_RAD)
         stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
 
         def part(name: str) -> Array:
@@ -236,11 +240,11 @@ def avatar_walking(path: Path) -> None:
 
 def tracking(path: Path) -> None:
     """Draws both worlds while the box is seen, and while it is hidden and that of the twin has fallen."""
-    with Stage(620, 380) as stage:
+    with Stage(1480, 620) as stage:
         stage.launch("tracking_example.launch")
         frames = Frames("lab/rpbi/world")
         boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
-        view = Orbit(1.45, (0.0, 0.6, 0.13), 0.4, 0.2)
+        view = Orbit(1.25, (0.0, 0.6, 0.2), 0.5, 0.0)
         stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
 
         def apart() -> float:
@@ -251,25 +255,28 @@ def tracking(path: Path) -> None:
             """Moves the box of the laboratory, or holds it."""
             rospy.ServiceProxy("lab/toggle_figure_eight", SetBool)(is_on)
 
-        def moment(condition: Callable[[], bool], meaning: str, caption: str, twin: str) -> Image.Image:
+        def moment(condition: Callable[[], bool], meaning: str, caption: str) -> Image.Image:
             wait_until(condition, meaning)
             carry(False)
             for name in boxes:
                 stage.stop_world(name)
             scene = stage.still_picture()
-            for text, name, (column, row) in (("laboratory", "lab", (-20, 110)), (twin, "twin", (-40, 120))):
-                at = view.pixel(frames.wait_for(boxes[name]), scene)
-                label(scene, text, (at[0] + column, min(at[1] + row, 350)), at)
+            parts = []
+            for name, middle in (("laboratory", np.zeros(3)), ("twin", TWIN)):
+                x, y = map(round, view.pixel(middle + (0.0, 0.0, 0.2), scene))
+                part = scene.crop((x - PART_PX // 2, y - PART_PX // 2, x + PART_PX // 2, y + PART_PX // 2))
+                label(part, name, (PART_PX // 2, 20))
+                parts.append(part)
             for name in boxes:
                 call(f"{name}/rpbi/start")
             carry(True)
-            return with_caption(scene, caption)
+            return with_caption(beside(*parts, gap_px=2), caption)
 
         def is_on_floor() -> bool:
             return bool(frames.wait_for(boxes["twin"])[2] < 0.05 + TWIN[2] + 0.005)
 
-        seen = moment(lambda: apart() < 0.02, "Vicon sees the box", "Vicon sees the box", "twin: at the same place")
-        hidden = moment(is_on_floor, "the box of the twin falls", "the box is hidden", "twin: it has fallen")
+        seen = moment(lambda: apart() < 0.02, "Vicon sees the box", "The box is seen: both boxes are at the same place")
+        hidden = moment(is_on_floor, "the box of the twin falls", "The box is hidden: the box of the twin has fallen")
     write_png(path, beside(seen, hidden))
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import rospy
 from files import write_png
-from labels import label, legend
+from labels import label, with_legend
 from plots import empty_figure, save, show
 from rviz_view import rviz_camera
 from screen import PATIENCE_S, Stage, call, next_message, wait_until
@@ -56,8 +56,7 @@ def draw_pushing_mpc(path: Path) -> None:
         next_message("mpc/status", MpcStatus, lambda status: status.cycle >= PUSHED_CYCLES)
         call("mpc/stop")
         picture = stage.still_picture()
-    legend(picture, PUSHING_LEGEND, (16, 16))
-    write_png(path, picture)
+    write_png(path, with_legend(picture, PUSHING_LEGEND))
 
 
 def draw_real_robot(path: Path) -> None:
