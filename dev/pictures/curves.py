@@ -170,6 +170,19 @@ def draw_farm(path: Path) -> None:
     save(figure, path)
 
 
+def draw_slow(path: Path) -> None:
+    """Draws the table of docs/slow.md with the computing time of a tick by the contents of the world."""
+    text = (ROOT / "docs/slow.md").read_text(encoding="utf-8")
+    table = text[text.index("| world | computing time") :].split("\n\n")[0]
+    rows = re.findall(r"^\| ([^|]+) \| ([\d.]+) \|$", table, re.MULTILINE)
+    names, times = zip(*((name.replace("`", ""), float(value)) for name, value in reversed(rows)))
+    figure, (axes,) = new_figure(1, 1, (8.6, 2.8))
+    axes.bar_label(axes.barh(names, times, color=BLUE), padding=4)
+    axes.grid(axis="y", visible=False)
+    axes.set(xlabel="computing time of a tick, relative to the first row")
+    save(figure, path)
+
+
 def draw_talos_push(path: Path) -> None:
     """Draws the table of docs/example_talos.md, which took hours to measure."""
     from rpbi_examples.balance.largest_push import draw, pushes_in

@@ -70,6 +70,8 @@ PICTURES: dict[str, str] = {
     "trajectories.png": "curves:draw_trajectories",
     "dynamics.png": "curves:draw_dynamics",
     "farm.png": "curves:draw_farm",
+    "slow.png": "curves:draw_slow",
+    "extending.png": "guides:draw_extending",
     "contacts.png": "guides:draw_contacts",
     "bases.png": "guides:draw_bases",
     "hands.png": "guides:draw_hands",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -43,6 +45,8 @@ POSTURE = (0.3, 0.6, 0.0, -1.2, 0.0, 0.9, 0.0)
 """Joint positions of the arm whose frames are drawn [rad]."""
 ABOVE_M = 1.75
 """Height of the cube in the first picture of the soft body [m]."""
+CARRIED_S = 1.0
+"""Time for which the belt of the template has carried the parcel [s]."""
 AXIS_M = 0.09
 """Length of the drawn axes [m]."""
 
@@ -179,8 +183,26 @@ def draw_robot_model(path: Path) -> None:
                 view.line([tuple(origin), end], colour, 4.0)
                 if name == "lwr_arm_0_link":
                     view.words(end, "xyz"[column], colour, (4, -4))
-    hand = (base @ frames[robot.frames.links.index("lwr_arm_7_link")])[:3, 3]
-    view.pointer(tuple(hand), "lwr_arm_7_link: {:.3f}, {:.3f}, {:.3f} m".format(*hand), (-300, -70))
+    hand = frames[robot.frames.links.index("lwr_arm_7_link")]
+    words = "lwr_arm_7_link: {:.3f}, {:.3f}, {:.3f} m in the base".format(*hand[:3, 3])
+    view.pointer(tuple((base @ hand)[:3, 3]), words, (-330, -110))
+    write_png(path, view.picture(), dither=True)
+
+
+def draw_extending(path: Path) -> None:
+    """Draws the world of the template package, while the belt carries the parcel."""
+    template = ROOT / "docs/templates/my_robot_lab"
+    os.environ["ROS_PACKAGE_PATH"] = f"{template}:{os.environ.get('ROS_PACKAGE_PATH', '')}"
+    sys.path.append(str(template / "src"))
+    world = World.from_file("{my_robot_lab}/configs/lab.yaml")
+    while world.clock.time_s < CARRIED_S:
+        world.step()
+    camera = Photographer((1.5, -1.5, 1.2), (0.2, -0.1, 0.25), 34.0, (900, 560))
+    view = Overlay(camera, camera.picture(world))
+    for name, offset in (("parcel", (60.0, -60.0)), ("belt", (-150.0, 90.0)), ("pusher", (70.0, 130.0))):
+        body: Any = world.bodies[name]
+        view.pointer(body.base_pose().position, name, offset)
+    world.close()
     write_png(path, view.picture(), dither=True)
 
 

@@ -46,7 +46,7 @@ RESTS_S = 3.0
 """Time after which the arm rests on the box [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
-PART_PX = 400
+PART_PX = 360
 """Rows and columns of the part of RViz's view that shows one of two worlds [px]."""
 CAMERA_YAW_RAD = -0.8
 """Direction of the camera as seen from the avatar [rad]."""
@@ -56,7 +56,7 @@ BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 
 def telepresence(path: Path) -> None:
     """Draws the sleeve on the forearm and past the elbow, while it presses on the arm."""
-    with Stage(620, 460) as stage:
+    with Stage(620, 500) as stage:
         stage.launch("telepresence.launch", "seed:=3")
         frames, surface = Frames(), Newest("rpbi/sleeve/surface", Marker)
         force, arrows = Newest("telepresence/force", Float64), Newest("rpbi/human/contacts/arrows", MarkerArray)
@@ -78,19 +78,20 @@ def telepresence(path: Path) -> None:
         def presses() -> bool:
             return bool(force.message.data > SHOWN_N and forces())
 
-        view = Orbit(0.95, (0.4, -0.2, 1.27), 0.45, 0.85)
+        view = Orbit(1.1, (0.42, -0.22, 1.36), 0.4, 0.85)
         stage.rviz(RVIZ / "telepresence.rviz", **view.properties)
         wait_until(lambda: force.message, "the robot moves")
         stop_when(stage, lambda: -0.25 < past_elbow() < -0.08 and presses())
         before = stage.still_picture()
-        label(before, "sleeve", (260, 400), view.pixel(ring(7), before))
-        label(before, "elbow", (380, 300), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
+        label(before, "sleeve", (250, 440), view.pixel(ring(7), before))
+        label(before, "elbow", (370, 340), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
         call("rpbi/start")
         stop_when(stage, lambda: past_elbow() > 0.0 and presses())
         first = forces()[0].points[0]
         after = stage.still_picture()
-        label(after, "forces", (80, 200), view.pixel((first.x, first.y, first.z), after))
-    write_png(path, beside(before, after))
+        label(after, "forces", (60, 150), view.pixel((first.x, first.y, first.z), after))
+    captions = "The sleeve is over the forearm.", "The cuff of the sleeve is past the elbow."
+    write_png(path, beside(*map(with_caption, (before, after), captions)))
 
 
 def teleop(path: Path) -> None:
@@ -244,7 +245,7 @@ def tracking(path: Path) -> None:
         stage.launch("tracking_example.launch")
         frames = Frames("lab/rpbi/world")
         boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
-        view = Orbit(1.25, (0.0, 0.6, 0.2), 0.5, 0.0)
+        view = Orbit(1.2, (0.0, 0.6, 0.2), 0.7, 0.3)
         stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
 
         def apart() -> float:
