@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from files import give_palette
 from plots import legend_below, new_figure, save
 from pushes import example
 
@@ -99,7 +101,8 @@ def draw_gym_curve(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / path.name
         subprocess.run(["python3", "-m", train_reach.__name__, "--out", out], check=True)
-        out.replace(path)
+        shutil.copyfile(out, path)
+    give_palette(path)
 
 
 def draw_trajectories(path: Path) -> None:
@@ -188,6 +191,7 @@ def draw_talos_push(path: Path) -> None:
     from rpbi_examples.balance.largest_push import draw, pushes_in
 
     draw(pushes_in((ROOT / "docs/example_talos.md").read_text(encoding="utf-8")), path)
+    give_palette(path)
 
 
 def draw_tutorial_path(path: Path) -> None:
@@ -203,7 +207,8 @@ def draw_tutorial_path(path: Path) -> None:
         wait_until(lambda: "/rpbi/box/base_state" in dict(rospy.get_published_topics()), "the box is there")
         for script in ("lift.py", "path.py"):
             subprocess.run(["python3", script], cwd=folder, env=os.environ, check=True)
-        path.write_bytes((Path(folder) / "path.png").read_bytes())
+        shutil.copyfile(Path(folder) / "path.png", path)
+    give_palette(path)
 
 
 def _swung(interpolation: str) -> Array:

@@ -10,7 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
-from files import write_png  # noqa: E402
+from files import give_palette, write_png  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from PIL import Image  # noqa: E402
@@ -61,5 +61,8 @@ def save(figure: Figure, path: Path, has_photographs: bool = False) -> None:
     """
     figure.savefig(path)
     plt.close(figure)
-    with Image.open(path) as picture:
-        write_png(path, picture.convert("RGB"), dither=has_photographs)
+    if has_photographs:
+        with Image.open(path) as picture:
+            write_png(path, picture.convert("RGB"), dither=True)
+    else:
+        give_palette(path)

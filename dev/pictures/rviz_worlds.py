@@ -259,7 +259,7 @@ def lfd_rviz(path: Path) -> None:
 def tutorial_rviz(path: Path) -> None:
     """The world of the tutorial, from the files on its page."""
     page = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
-    view = View((0.35, 0.0, 0.29), 1.4, 0.85, 5.55)
+    view = View((0.35, 0.0, 0.34), 1.65, 0.8, 5.55)
     with Stage(1280, 720) as stage, tempfile.TemporaryDirectory() as folder:
         for text, name in re.findall(r"```yaml\n(# (\S+).*?)```", page, flags=re.DOTALL):
             (Path(folder) / name).write_text(text, encoding="utf-8")

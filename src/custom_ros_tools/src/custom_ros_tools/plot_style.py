@@ -26,6 +26,7 @@ STYLE: dict[str, Any] = {
     "axes.titlecolor": INK,
     "axes.titlelocation": "left",
     "axes.titlesize": 11,
+    "figure.constrained_layout.use": True,
     "font.family": ["Liberation Sans", "DejaVu Sans"],
     "font.size": 11,
     "grid.color": PALE,
