@@ -84,12 +84,11 @@ def draw_ik_errors(path: Path) -> None:
     figure, axes = new_figure(2, 1, (9.0, 5.0), sharex=True, height_ratios=(1.0, 1.4))
     for name, width, style in (("kdl", 4.5, "-"), ("pybullet", 2.0, "-"), ("tasks", 1.6, ":"), ("trac_ik", 1.0, "-")):
         times_s, distances_mm = _followed(name)
-        label = f"{name}: median {np.median(distances_mm):.1f} mm, largest {distances_mm.max():.1f} mm"
+        label = f"{name}: median {np.median(distances_mm):.1f}, largest {distances_mm.max():.1f} mm"
         axes[name == "trac_ik"].plot(times_s, distances_mm, style, lw=width, label=label)
     for each in axes:
-        each.set(ylim=(0.0, None), xlim=(0.0, SHOWN_S))
-        each.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.0, fontsize=10)
-    figure.supylabel("distance between tip and target [mm]", fontsize=11, color=INK)
+        each.set(ylim=(0.0, None), xlim=(0.0, SHOWN_S), ylabel="tip to target [mm]")
+        each.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.0, fontsize=9.5)
     axes[-1].set_xlabel("time since the target began to move [s]")
     save(figure, path)
 

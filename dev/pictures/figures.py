@@ -65,6 +65,15 @@ def draw_press(path: Path) -> None:
     give_palette(path)
 
 
+def draw_lfd_pipeline(path: Path) -> None:
+    """Draws the stages of a scripted run of the example `lfd`."""
+    with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
+        arguments = ("operator:=scripted", "seed:=3", "headless:=true", f"out:={folder}")
+        stage.launch("lfd.launch", *arguments).wait(PATIENCE_S)
+        shutil.copyfile(Path(folder) / "pipeline.png", path)
+    give_palette(path)
+
+
 def draw_pushing_report(path: Path) -> None:
     """Draws one of the pictures that the example `pushing_mpc` writes at the end of a push, by the name of the file."""
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:

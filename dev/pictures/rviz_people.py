@@ -1,4 +1,4 @@
-"""Pictures of RViz with people: telepresence, teleoperation, a haptic device, the avatar, the guard, tracking."""
+"""Pictures of RViz with people: telepresence, teleoperation, a haptic device, the avatar, tracking."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import rospy
-import yaml
 from files import write_png
 from geometry_msgs.msg import WrenchStamped
 from labels import label
@@ -17,33 +16,20 @@ from live import Array, Frames, Newest, Orbit, grab, place, xdotool
 from PIL import Image, ImageDraw
 from render import beside, with_caption
 from screen import Stage, call, wait_until
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rpbi_examples.dressing.outcome import rings_of
-from safe_robot.msg import Status
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "src/rpbi_examples"
 RVIZ = EXAMPLES / "rviz"
-GUARD = {
-    "base_frame": "rpbi/kuka_lwr/base",
-    "left_out": ["kuka_lwr", "floor"],
-    "period_s": 0.018,
-    "silence_s": 1.0,
-    "limits": {"acceleration": 10.0, "jerk": 1000.0},
-    "checks": {"environment": {"margin_m": 0.1, "timeout_s": 5.0}, "staleness": {"timeout_s": 5.0}},
-}
-"""Parameters of the guard; its times allow for a busy machine."""
 SHOWN_N = 0.05
 """Least force that the text in RViz does not round to 0 [N]."""
-SPEED, PERIOD_S, FARTHEST_RAD = 0.05, 0.02, 0.5
-"""Speed of the joint that moves the arm down at the table [rad/s], time between two targets, and its longest motion."""
 ARRIVES_S = 1.0
 """Time in which all messages of a stopped world arrive [s]."""
 RESTS_S = 3.0
-"""Time after which the arm rests on the box [s]."""
+"""Time after which the arm rests on the box, and after which RViz shows all segments of people [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
 PART_PX = 360
@@ -150,64 +136,6 @@ def human_interaction(path: Path) -> None:
     write_png(path, beside(scene, middle_of(window, scene.height)))
 
 
-def guard_rviz(path: Path) -> None:
-    """Draws the distances of an arm that was driven down at a table until the guard halted it."""
-    with Stage(900, 600) as stage, tempfile.TemporaryDirectory() as folder:
-        world = Path(folder) / "world.yaml"
-        world.write_text(yaml.safe_dump(table_world(Path(folder))), encoding="utf-8")
-        stage.launch("world.launch", f"config:={world}", "use_sim_time:=false")
-        frames, measured = Frames(), Newest("rpbi/kuka_lwr/joint_states", JointState)
-        wait_until(lambda: measured.message, "the arm is there")
-        rospy.set_param("robot_description", (EXAMPLES / "robots/kuka_lwr.urdf").read_text(encoding="utf-8"))
-        rospy.set_param("guard", GUARD)
-        states = "rpbi/kuka_lwr/joint_states"
-        remaps = f"joint_states/command:={states}/target", f"joint_states/measured:={states}"
-        stage.start(["rosrun", "safe_robot", "safe_robot_node.py", "__name:=guard", *remaps])
-        status, targets = Newest("robot_safety/status", Status), rospy.Publisher("joint_states/target", JointState)
-        view = Orbit(0.95, (0.1, 0.0, 0.25), 0.55, 5.2)
-        shown = {"TF": None, "Guard": {"Namespaces": {"self_collision": False}}}
-        stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", shown, **view.properties)
-        names, start = measured.message.name, np.array(measured.message.position)
-        downwards, moved = np.array([name == "lwr_arm_1_joint" for name in names]), 0.0
-
-        def send() -> bool:
-            """Sends a target, and returns whether the newest one was safe."""
-            message = JointState(name=names, position=(start + moved * downwards).tolist())
-            message.header.stamp = rospy.Time.now()
-            targets.publish(message)
-            time.sleep(PERIOD_S)
-            return status.message is not None and status.message.is_safe
-
-        wait_until(send, "the guard takes targets")
-        while send() and moved < FARTHEST_RAD:
-            moved += SPEED * PERIOD_S
-        stage.stop_world()
-        scene, tip = stage.still_picture(), frames.wait_for(TIP)
-    label(
-        scene, "the guard halted the arm 100 mm above the table", (235, 568), view.pixel(tip - (0.0, 0.0, 0.09), scene)
-    )
-    write_png(path, scene)
-
-
-def table_world(folder: Path) -> dict[str, object]:
-    """Returns the main file of a world with an arm over a table; writes the table's file."""
-    size = {"shapeType": "GEOM_BOX", "halfExtents": [0.2, 0.14, 0.01]}
-    table = {
-        "name": "table",
-        "createVisualShape": {**size, "rgbaColor": [0.95, 0.92, 0.85, 1.0]},
-        "createCollisionShape": size,
-        "basePosition": [-0.05, 0.0, 0.01],
-    }
-    (folder / "table.yaml").write_text(yaml.safe_dump(table), encoding="utf-8")
-    return {
-        "setGravity": {"gravZ": -9.81},
-        "timeStep": 0.002,
-        "poses": [{"tf_id": "rpbi/floor"}],
-        "collision_objects": ["{rpbi_examples}/configs/floor.yaml", str(folder / "table.yaml")],
-        "robots": ["{rpbi_examples}/configs/basic_example_kuka_lwr/kuka_lwr.yaml"],
-    }
-
-
 def avatar_walking(path: Path) -> None:
     """Draws the avatar in a stride, and while it reaches forward."""
     with Stage(560, 520) as stage:
@@ -237,6 +165,17 @@ def avatar_walking(path: Path) -> None:
             moment(lambda: part("RightHand")[0] > 0.45, "the right hand reaches forward"),
         )
     write_png(path, beside(*pictures))
+
+
+def mvn(path: Path) -> None:
+    """Draws two people of the emulator, with the frames of their segments."""
+    with Stage(900, 640) as stage:
+        stage.launch("mvn.launch", "people:=2", "arm_held_out:=true")
+        view = Orbit(3.3, (0.0, 0.45, 0.85), 0.3, 0.5)
+        stage.rviz(RVIZ / "mvn.rviz", {"TF": {"Marker Scale": 0.35}}, **view.properties)
+        time.sleep(RESTS_S)
+        picture = stage.picture()
+    write_png(path, picture)
 
 
 def tracking(path: Path) -> None:
