@@ -15,8 +15,10 @@ from matplotlib.axes import Axes
 from plots import legend_below, new_figure, save
 from pushes import COMPLIANT, PLANE, Force, pushed
 
-BEFORE, AFTER, INK = "#c0392b", "#e8731a", "#22333f"
-"""Colours of a push without and with a setting, and of other quantities."""
+from custom_ros_tools.plot_style import BLUE, INK, ORANGE
+
+BEFORE, AFTER = ORANGE, BLUE
+"""Colours of a push without and with a setting."""
 TOP_N = 25.0
 """Largest force in plots of whole pushes; first touches are higher [N]."""
 RUN_UP_M = 0.035
@@ -31,7 +33,7 @@ def draw_floor(path: Path) -> None:
     figure, axes = new_figure(2, 2, (9.0, 5.0), sharex=True, height_ratios=(3, 1))
     for column, (name, force) in enumerate(forces.items()):
         above, below = axes[column], axes[2 + column]
-        above.plot(force.time_s, force.friction, color=INK, lw=3.0, alpha=0.35, label="friction limit, mu N")
+        above.plot(force.time_s, force.friction, color=INK, lw=3.0, alpha=0.35, label="friction limit, \u03bc N")
         above.plot(force.time_s, force.push, color=AFTER, lw=1.0, label="push of the arm")
         above.set(title=f"floor: {name}\n{_steady(force)}", ylim=(0.0, TOP_N))
         below.plot(force.time_s, force.points, color=INK, lw=1.0)
@@ -118,7 +120,7 @@ def _draw_touch_and_push(path: Path, forces: Mapping[str, Force]) -> None:
         push.plot(since_s, force.friction, color=colour, lw=5.0, alpha=0.25)
         push.plot(since_s, force.push, color=colour, lw=1.2)
     touch.set(xlim=(-10.0, 60.0), xlabel="time since the touch [ms]", title="first touch")
-    touch.plot([], [], color="0.4", lw=5.0, alpha=0.35, label="friction limit of the floor, mu N")
+    touch.plot([], [], color="0.4", lw=5.0, alpha=0.35, label="friction limit of the floor, \u03bc N")
     push.set(xlim=(-0.1, None), ylim=(0.0, 10.0), xlabel="time since the touch [s]", title="the whole push")
     touch.set_ylabel("push of the arm [N]")
     legend_below(figure, touch)

@@ -1,4 +1,4 @@
-"""Diagrams of the packages, of a tick, and of an episode that becomes a verified data set."""
+"""Diagrams of the packages, a tick, an episode that becomes a data set, two computers, and the bridge to ROS 2."""
 
 from __future__ import annotations
 
@@ -135,4 +135,47 @@ def episode_to_dataset(path: Path) -> None:
     drawing.text((410, 192), "rows of one rate", anchor="start")
     drawing.arrow(dataset.right(), check.left())
     drawing.arrow(dataset.left(), train.right())
+    drawing.write(path)
+
+
+def computers(path: Path) -> None:
+    """Draws the connections of nodes on two computers: each to the master, and directly to each other."""
+    drawing = Diagram(800, 300, "Nodes on two computers: each needs the master and the other nodes")
+    drawing.box(Box(16, 16, 330, 268), PLAIN, "robot PC, 192.168.1.10", centred=False)
+    drawing.box(Box(454, 16, 330, 268), PLAIN, "your computer, 192.168.1.20", centred=False)
+    master = drawing.box(Box(36, 60, 290, 62), DATA, "roscore: the master", ["TCP port 11311"])
+    driver = drawing.box(
+        Box(36, 180, 290, 84), PEOPLE, "driver, sensors", ["publish measured states,", "read commands"]
+    )
+    nodes = drawing.box(Box(474, 60, 290, 62), GUARD, "guard, RViz, your nodes", ["two TCP ports for each node"])
+    world = drawing.box(
+        Box(474, 180, 290, 84), SIMULATOR, "simulator", ["publishes simulated states,", "reads targets"]
+    )
+    drawing.arrow(nodes.left(), master.right(), dashed=True)
+    drawing.text((400, 62), "names,")
+    drawing.text((400, 80), "addresses")
+    drawing.arrow(driver.top(), master.bottom(), dashed=True)
+    drawing.arrow(nodes.left(0.8), driver.right(0.2), both=True)
+    drawing.arrow(driver.right(0.6), world.left(0.6), both=True)
+    drawing.text((400, 250), "messages")
+    drawing.arrow(world.top(), nodes.bottom(), both=True)
+    drawing.write(path)
+
+
+def ros2(path: Path) -> None:
+    """Draws the bridge between the topics of ROS 1 and programs with ROS 2, and the companion for services."""
+    drawing = Diagram(800, 250, "Topics pass through the bridge; services and actions need the companion")
+    drawing.box(Box(16, 16, 420, 218), PLAIN, "the simulator's computer, with ROS 1", centred=False)
+    drawing.box(Box(534, 16, 250, 218), PLAIN, "programs with ROS 2", centred=False)
+    world = drawing.box(Box(32, 60, 170, 158), SIMULATOR, "simulator, nodes", ["topics of ROS 1,", "services"])
+    bridge = drawing.box(Box(250, 60, 170, 158), GUARD, "the bridge", ["rpbi_ros2,", "Cyclone DDS"])
+    nodes = drawing.box(Box(550, 60, 218, 66), PEOPLE, "rclpy, rclcpp, RViz 2", ["the same names of topics"])
+    companion = drawing.box(
+        Box(550, 144, 218, 74), PEOPLE, "the companion", ["services and actions", "of the simulator"]
+    )
+    drawing.arrow(world.right(), bridge.left(), both=True)
+    for other in (nodes, companion):
+        drawing.arrow((bridge.right()[0], other.left()[1]), other.left(), both=True)
+    drawing.text((477, 78), "topics")
+    drawing.text((477, 164), "requests")
     drawing.write(path)

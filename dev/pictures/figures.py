@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pandas as pd
+from files import give_palette
 from screen import PATIENCE_S, Stage
 
 from rpbi.samples import ContactsSample, WrenchSample
@@ -52,6 +53,7 @@ def draw_forces(path: Path) -> None:
     columns = ["time", *(f"wrench/force/{axis}" for axis in "xyz")]
     sensor = pd.DataFrame(wrist, columns=columns).set_index("time")
     plot_forces(table["push"], FRICTION * table["floor"], sensor, 0.0, path)
+    give_palette(path)
 
 
 def draw_press(path: Path) -> None:
@@ -60,6 +62,16 @@ def draw_press(path: Path) -> None:
         arguments = ("device:=scripted", "headless:=true", f"output:={folder}")
         stage.launch("human_interaction.launch", *arguments).wait(PATIENCE_S)
         shutil.copyfile(Path(folder) / "human_interaction.png", path)
+    give_palette(path)
+
+
+def draw_lfd_pipeline(path: Path) -> None:
+    """Draws the stages of a scripted run of the example `lfd`."""
+    with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
+        arguments = ("operator:=scripted", "seed:=3", "headless:=true", f"out:={folder}")
+        stage.launch("lfd.launch", *arguments).wait(PATIENCE_S)
+        shutil.copyfile(Path(folder) / "pipeline.png", path)
+    give_palette(path)
 
 
 def draw_pushing_report(path: Path) -> None:
@@ -67,6 +79,7 @@ def draw_pushing_report(path: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
         stage.launch("pushing_mpc.launch", "headless:=true", f"out:={folder}").wait(PATIENCE_S)
         shutil.copyfile(Path(folder) / path.name.removeprefix("pushing_"), path)
+    give_palette(path)
 
 
 def draw_wiping_force(path: Path) -> None:
@@ -75,6 +88,7 @@ def draw_wiping_force(path: Path) -> None:
     result = run_episode(env, WIPING_SEED)
     draw_wiping(cast(Wiping, cast(SceneTask, env.task).scene), result, f"wiping, seed {WIPING_SEED}", path)
     env.close()
+    give_palette(path)
 
 
 def _pushes(world: World) -> Iterator[dict[str, float]]:

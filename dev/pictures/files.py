@@ -38,6 +38,12 @@ def write_png(path: Path, picture: Image.Image, colours: int = 256, dither: bool
     picture.convert("RGB").quantize(palette=palette, dither=kind).save(path, optimize=True)
 
 
+def give_palette(path: Path) -> None:
+    """Writes the PNG file of a plot again with a palette, so that it is smaller."""
+    with Image.open(path) as picture:
+        write_png(path, picture.convert("RGB"))
+
+
 def write_gif(
     path: Path,
     frames: Sequence[Image.Image],

@@ -71,7 +71,7 @@ def draw_guard(path: Path) -> None:
                 world.close()
                 _draw_distance(axes[3 * row + 2], _distances_mm(judge, q, motion), word, colour)
             _finish(axes[3 * row + 2], motion)
-    save(figure, path)
+    save(figure, path, has_photographs=True)
 
 
 def _draw_distance(axes: Axes, distance_mm: Array, word: str, colour: str) -> None:

@@ -52,4 +52,4 @@ def draw_ik_talos(path: Path) -> None:
     supports[0].set_ylabel("x, forward [m]")
     legend_below(figure, supports[0], 2)
     world.close()
-    save(figure, path)
+    save(figure, path, has_photographs=True)

@@ -49,7 +49,7 @@ def draw_interpolation(path: Path) -> None:
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.2))
     show(left.subplots(), view.picture())
     draw_motion(right, rows, times_s, waypoints)
-    save(figure, path)
+    save(figure, path, has_photographs=True)
 
 
 def _moved(world: World) -> tuple[list[tuple[float, Array, Array]], list[float], Array]:

@@ -33,25 +33,23 @@ def label(
     draw.text(at, text, INK, font(SIZE_PX), anchor="mm")
 
 
-def legend(picture: Image.Image, lines: Sequence[tuple[str, str]], at: tuple[int, int]) -> None:
-    """Writes texts below each other on white, each after a sample of its colour.
+def with_legend(picture: Image.Image, lines: Sequence[tuple[str, str]]) -> Image.Image:
+    """Returns a picture with texts in a row below it, each after a sample of its colour.
 
     Args:
-        picture: The picture, which is changed.
+        picture: The picture.
         lines: Colours and texts.
-        at: Column and row of the upper left corner [px].
     """
-    draw = ImageDraw.Draw(picture)
-    height, sample = SIZE_PX + MARGIN_PX, 2 * SIZE_PX
-    width = sample + 3 * MARGIN_PX + max(int(draw.textlength(text, font(SIZE_PX))) for _, text in lines)
-    left, top = at
-    draw.rounded_rectangle(
-        (left, top, left + width, top + height * len(lines) + 2 * MARGIN_PX), MARGIN_PX, PAPER, "#bbbbbb"
-    )
-    for row, (colour, text) in enumerate(lines):
-        middle = top + MARGIN_PX + height * row + height // 2
-        draw.line((left + MARGIN_PX, middle, left + MARGIN_PX + sample, middle), colour, 4)
-        draw.text((left + 2 * MARGIN_PX + sample, middle), text, INK, font(SIZE_PX), anchor="lm")
+    height, sample = 2 * SIZE_PX, 2 * SIZE_PX
+    whole = Image.new("RGB", (picture.width, picture.height + height), PAPER)
+    whole.paste(picture)
+    draw = ImageDraw.Draw(whole)
+    left, middle = float(MARGIN_PX), picture.height + height // 2
+    for colour, text in lines:
+        draw.line((left, middle, left + sample, middle), colour, 5)
+        draw.text((left + sample + MARGIN_PX, middle), text, INK, font(SIZE_PX), anchor="lm")
+        left += sample + 5 * MARGIN_PX + draw.textlength(text, font(SIZE_PX))
+    return whole
 
 
 def inset(picture: Image.Image, small: Image.Image, text: str, at: tuple[int, int]) -> None:

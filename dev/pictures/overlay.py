@@ -62,6 +62,13 @@ class Overlay:
         self._draw.rounded_rectangle((left - edge, top - edge, right + edge, bottom + edge), 4 * FINE, BRIGHT)
         self._draw.text((x, y), text, colour, letters, anchor="lm")
 
+    def pointer(self, point: Vector, text: str, offset_px: tuple[float, float]) -> None:
+        """Writes a text at an offset from a point, with a line from the text to the point."""
+        (x, y), (right, down) = self._fine(point), offset_px
+        self._draw.line([(x, y), (x + FINE * right, y + FINE * down)], "black", round(FINE * 1.5))
+        self.dot(point, "black", 4.0)
+        self.words(point, text, offset_px=offset_px)
+
     def picture(self) -> Image.Image:
         """Returns the render with all that was drawn."""
         return Image.alpha_composite(self._render, self._layer.reduce(FINE)).convert("RGB")

@@ -1,4 +1,4 @@
-"""Common style of the plots: size of text, colours of axes as in RViz, and legends outside of the data."""
+"""Figures in the common style of plots, pictures in them, and legends below them."""
 
 from __future__ import annotations
 
@@ -10,24 +10,16 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
+from files import give_palette, write_png  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from PIL import Image  # noqa: E402
 
-X, Y, Z = "#d62728", "#2ca02c", "#1f77b4"
-"""Colours of the axes x, y and z, as RViz has them: red, green, blue."""
-GOOD, BAD = "#2ca02c", "#d62728"
-DPI = 120
-STYLE = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": 11,
-    "font.size": 11,
-    "grid.alpha": 0.3,
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
-}
+from custom_ros_tools.plot_style import GREEN, ORANGE, plot_style  # noqa: E402
+
+GOOD, BAD = GREEN, ORANGE
+_STYLE = plot_style()
+_STYLE.__enter__()  # until the process ends, since it draws one picture
 
 
 def new_figure(
@@ -37,14 +29,12 @@ def new_figure(
 
     `subplots` are further arguments of `matplotlib.pyplot.subplots`.
     """
-    plt.rcParams.update(STYLE)
     figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **subplots)
     return figure, list(axes.flat)
 
 
 def empty_figure(size: tuple[float, float]) -> Figure:
     """Returns a figure of `size` inches in the style of the pages, without axes."""
-    plt.rcParams.update(STYLE)
     return plt.figure(figsize=size, layout="constrained")
 
 
@@ -54,19 +44,25 @@ def show(axes: Axes, picture: Image.Image) -> None:
     axes.axis("off")
 
 
-def legend_beside(axes: Axes) -> None:
-    """Puts the legend to the right of the data."""
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-
-
 def legend_below(figure: Figure, axes: Axes, columns: int = 1) -> None:
     """Puts the legend of one of the axes below all plots of the figure."""
     legend = figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=columns)
-    share = legend.get_window_extent().height / figure.bbox.height
+    share = legend.get_window_extent().height / figure.bbox.height + 0.01
     figure.get_layout_engine().set(rect=(0.0, share, 1.0, 1.0 - share))
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Writes the figure, and closes it."""
-    figure.savefig(path, dpi=DPI)
+def save(figure: Figure, path: Path, has_photographs: bool = False) -> None:
+    """Writes the figure with a palette, so that the file is small, and closes it.
+
+    Args:
+        figure: The figure.
+        path: The PNG file.
+        has_photographs: Whether the figure shows renders, whose gradients need dithering.
+    """
+    figure.savefig(path)
     plt.close(figure)
+    if has_photographs:
+        with Image.open(path) as picture:
+            write_png(path, picture.convert("RGB"), dither=True)
+    else:
+        give_palette(path)

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
+from custom_ros_tools.plot_style import STYLE
 from rpbi.images import looking_at
 from rpbi.render.camera import Intrinsics, view_matrix
 from rpbi.render.frame import Camera
@@ -100,8 +101,8 @@ class Photographer:
 
 
 def font(size_px: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """Returns the font of captions, which comes with matplotlib."""
-    properties = font_manager.FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
+    """Returns the font of plots, for captions and labels."""
+    properties = font_manager.FontProperties(family=STYLE["font.family"], weight="bold" if bold else "normal")
     return ImageFont.truetype(font_manager.findfont(properties), size_px)
 
 

@@ -1,4 +1,4 @@
-"""Pictures of RViz with people: telepresence, teleoperation, a haptic device, the avatar, the guard, tracking."""
+"""Pictures of RViz with people: telepresence, teleoperation, a haptic device, the avatar, tracking."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import rospy
-import yaml
 from files import write_png
 from geometry_msgs.msg import WrenchStamped
 from labels import label
@@ -17,35 +16,24 @@ from live import Array, Frames, Newest, Orbit, grab, place, xdotool
 from PIL import Image, ImageDraw
 from render import beside, with_caption
 from screen import Stage, call, wait_until
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rpbi_examples.dressing.outcome import rings_of
-from safe_robot.msg import Status
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "src/rpbi_examples"
 RVIZ = EXAMPLES / "rviz"
-GUARD = {
-    "base_frame": "rpbi/kuka_lwr/base",
-    "left_out": ["kuka_lwr", "floor"],
-    "period_s": 0.018,
-    "silence_s": 1.0,
-    "limits": {"acceleration": 10.0, "jerk": 1000.0},
-    "checks": {"environment": {"margin_m": 0.1, "timeout_s": 5.0}, "staleness": {"timeout_s": 5.0}},
-}
-"""Parameters of the guard; its times allow for a busy machine."""
 SHOWN_N = 0.05
 """Least force that the text in RViz does not round to 0 [N]."""
-SPEED, PERIOD_S, FARTHEST_RAD = 0.05, 0.02, 0.5
-"""Speed of the joint that moves the arm down at the table [rad/s], time between two targets, and its longest motion."""
 ARRIVES_S = 1.0
 """Time in which all messages of a stopped world arrive [s]."""
 RESTS_S = 3.0
-"""Time after which the arm rests on the box [s]."""
+"""Time after which the arm rests on the box, and after which RViz shows all segments of people [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
+PART_PX = 360
+"""Rows and columns of the part of RViz's view that shows one of two worlds [px]."""
 CAMERA_YAW_RAD = -0.8
 """Direction of the camera as seen from the avatar [rad]."""
 BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
@@ -54,7 +42,7 @@ BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 
 def telepresence(path: Path) -> None:
     """Draws the sleeve on the forearm and past the elbow, while it presses on the arm."""
-    with Stage(600, 560) as stage:
+    with Stage(620, 500) as stage:
         stage.launch("telepresence.launch", "seed:=3")
         frames, surface = Frames(), Newest("rpbi/sleeve/surface", Marker)
         force, arrows = Newest("telepresence/force", Float64), Newest("rpbi/human/contacts/arrows", MarkerArray)
@@ -76,19 +64,20 @@ def telepresence(path: Path) -> None:
         def presses() -> bool:
             return bool(force.message.data > SHOWN_N and forces())
 
-        view = Orbit(1.3, (0.4, -0.22, 1.3), 0.25, 0.85)
+        view = Orbit(1.1, (0.42, -0.22, 1.36), 0.4, 0.85)
         stage.rviz(RVIZ / "telepresence.rviz", **view.properties)
         wait_until(lambda: force.message, "the robot moves")
         stop_when(stage, lambda: -0.25 < past_elbow() < -0.08 and presses())
         before = stage.still_picture()
-        label(before, "sleeve", (260, 400), view.pixel(ring(7), before))
-        label(before, "elbow", (380, 300), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
+        label(before, "sleeve", (250, 440), view.pixel(ring(7), before))
+        label(before, "elbow", (370, 340), view.pixel(frames.wait_for("rpbi/human/RightForeArm"), before))
         call("rpbi/start")
         stop_when(stage, lambda: past_elbow() > 0.0 and presses())
         first = forces()[0].points[0]
         after = stage.still_picture()
-        label(after, "forces", (80, 200), view.pixel((first.x, first.y, first.z), after))
-    write_png(path, beside(before, after))
+        label(after, "forces", (60, 150), view.pixel((first.x, first.y, first.z), after))
+    captions = "The sleeve is over the forearm.", "The cuff of the sleeve is past the elbow."
+    write_png(path, beside(*map(with_caption, (before, after), captions)))
 
 
 def teleop(path: Path) -> None:
@@ -128,7 +117,7 @@ def human_interaction(path: Path) -> None:
         force = Newest("haptics/force", WrenchStamped)
         handle = place("^Virtual haptic device$")
         wait_until(lambda: force.message, "the device runs")
-        view = Orbit(0.9, (0.0, 0.0, 0.25), 0.25, 5.2)
+        view = Orbit(0.85, (0.02, 0.0, 0.22), 0.55, 5.2)
         stage.rviz(RVIZ / "human_interaction.rviz", {"TF": None, "Guard": None}, **view.properties)
         rviz = place("RViz")
         xdotool("windowraise", handle.number, "mousemove", (handle.left + handle.right) // 2, handle.upper + 210)
@@ -147,68 +136,13 @@ def human_interaction(path: Path) -> None:
     write_png(path, beside(scene, middle_of(window, scene.height)))
 
 
-def guard_rviz(path: Path) -> None:
-    """Draws the distances of an arm that was driven down at a table until the guard halted it."""
-    with Stage(900, 600) as stage, tempfile.TemporaryDirectory() as folder:
-        world = Path(folder) / "world.yaml"
-        world.write_text(yaml.safe_dump(table_world(Path(folder))), encoding="utf-8")
-        stage.launch("world.launch", f"config:={world}", "use_sim_time:=false")
-        frames, measured = Frames(), Newest("rpbi/kuka_lwr/joint_states", JointState)
-        wait_until(lambda: measured.message, "the arm is there")
-        rospy.set_param("robot_description", (EXAMPLES / "robots/kuka_lwr.urdf").read_text(encoding="utf-8"))
-        rospy.set_param("guard", GUARD)
-        states = "rpbi/kuka_lwr/joint_states"
-        remaps = f"joint_states/command:={states}/target", f"joint_states/measured:={states}"
-        stage.start(["rosrun", "safe_robot", "safe_robot_node.py", "__name:=guard", *remaps])
-        status, targets = Newest("robot_safety/status", Status), rospy.Publisher("joint_states/target", JointState)
-        view = Orbit(0.7, (0.0, 0.0, 0.2), 0.3, 4.9)
-        stage.rviz(RVIZ / "kuka_lwr_ik_example.rviz", {"TF": None}, **view.properties)
-        names, start = measured.message.name, np.array(measured.message.position)
-        downwards, moved = np.array([name == "lwr_arm_1_joint" for name in names]), 0.0
-
-        def send() -> bool:
-            """Sends a target, and returns whether the newest one was safe."""
-            message = JointState(name=names, position=(start + moved * downwards).tolist())
-            message.header.stamp = rospy.Time.now()
-            targets.publish(message)
-            time.sleep(PERIOD_S)
-            return status.message is not None and status.message.is_safe
-
-        wait_until(send, "the guard takes targets")
-        while send() and moved < FARTHEST_RAD:
-            moved += SPEED * PERIOD_S
-        stage.stop_world()
-        scene, tip = stage.still_picture(), frames.wait_for(TIP)
-    label(scene, "the guard keeps the margin of 100 mm", (640, 480), view.pixel(tip - (0.0, 0.0, 0.08), scene))
-    write_png(path, scene)
-
-
-def table_world(folder: Path) -> dict[str, object]:
-    """Returns the main file of a world with an arm over a table; writes the table's file."""
-    size = {"shapeType": "GEOM_BOX", "halfExtents": [0.2, 0.14, 0.01]}
-    table = {
-        "name": "table",
-        "createVisualShape": {**size, "rgbaColor": [0.75, 0.62, 0.45, 1.0]},
-        "createCollisionShape": size,
-        "basePosition": [-0.05, 0.0, 0.01],
-    }
-    (folder / "table.yaml").write_text(yaml.safe_dump(table), encoding="utf-8")
-    return {
-        "setGravity": {"gravZ": -9.81},
-        "timeStep": 0.002,
-        "poses": [{"tf_id": "rpbi/floor"}],
-        "collision_objects": ["{rpbi_examples}/configs/floor.yaml", str(folder / "table.yaml")],
-        "robots": ["{rpbi_examples}/configs/basic_example_kuka_lwr/kuka_lwr.yaml"],
-    }
-
-
 def avatar_walking(path: Path) -> None:
     """Draws the avatar in a stride, and while it reaches forward."""
     with Stage(560, 520) as stage:
         stage.launch("avatar.launch")
         frames, world = Frames("rpbi/human/Pelvis"), Frames("rpbi/world")
         frames.wait_for("rpbi/human/RightHand")
-        view = Orbit(2.9, (0.1, 0.0, -0.05), 0.2, CAMERA_YAW_RAD)
+        view = Orbit(2.5, (0.1, 0.0, -0.05), 0.25, CAMERA_YAW_RAD)
         stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
 
         def part(name: str) -> Array:
@@ -233,13 +167,24 @@ def avatar_walking(path: Path) -> None:
     write_png(path, beside(*pictures))
 
 
+def mvn(path: Path) -> None:
+    """Draws two people of the emulator, with the frames of their segments."""
+    with Stage(900, 640) as stage:
+        stage.launch("mvn.launch", "people:=2", "arm_held_out:=true")
+        view = Orbit(3.3, (0.0, 0.45, 0.85), 0.3, 0.5)
+        stage.rviz(RVIZ / "mvn.rviz", {"TF": {"Marker Scale": 0.35}}, **view.properties)
+        time.sleep(RESTS_S)
+        picture = stage.picture()
+    write_png(path, picture)
+
+
 def tracking(path: Path) -> None:
     """Draws both worlds while the box is seen, and while it is hidden and that of the twin has fallen."""
-    with Stage(620, 380) as stage:
+    with Stage(1480, 620) as stage:
         stage.launch("tracking_example.launch")
         frames = Frames("lab/rpbi/world")
         boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
-        view = Orbit(1.45, (0.0, 0.6, 0.13), 0.4, 0.2)
+        view = Orbit(1.2, (0.0, 0.6, 0.2), 0.7, 0.3)
         stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
 
         def apart() -> float:
@@ -250,25 +195,28 @@ def tracking(path: Path) -> None:
             """Moves the box of the laboratory, or holds it."""
             rospy.ServiceProxy("lab/toggle_figure_eight", SetBool)(is_on)
 
-        def moment(condition: Callable[[], bool], meaning: str, caption: str, twin: str) -> Image.Image:
+        def moment(condition: Callable[[], bool], meaning: str, caption: str) -> Image.Image:
             wait_until(condition, meaning)
             carry(False)
             for name in boxes:
                 stage.stop_world(name)
             scene = stage.still_picture()
-            for text, name, (column, row) in (("laboratory", "lab", (-20, 110)), (twin, "twin", (-40, 120))):
-                at = view.pixel(frames.wait_for(boxes[name]), scene)
-                label(scene, text, (at[0] + column, min(at[1] + row, 350)), at)
+            parts = []
+            for name, middle in (("laboratory", np.zeros(3)), ("twin", TWIN)):
+                x, y = map(round, view.pixel(middle + (0.0, 0.0, 0.2), scene))
+                part = scene.crop((x - PART_PX // 2, y - PART_PX // 2, x + PART_PX // 2, y + PART_PX // 2))
+                label(part, name, (PART_PX // 2, 20))
+                parts.append(part)
             for name in boxes:
                 call(f"{name}/rpbi/start")
             carry(True)
-            return with_caption(scene, caption)
+            return with_caption(beside(*parts, gap_px=2), caption)
 
         def is_on_floor() -> bool:
             return bool(frames.wait_for(boxes["twin"])[2] < 0.05 + TWIN[2] + 0.005)
 
-        seen = moment(lambda: apart() < 0.02, "Vicon sees the box", "Vicon sees the box", "twin: at the same place")
-        hidden = moment(is_on_floor, "the box of the twin falls", "the box is hidden", "twin: it has fallen")
+        seen = moment(lambda: apart() < 0.02, "Vicon sees the box", "The box is seen: both boxes are at the same place")
+        hidden = moment(is_on_floor, "the box of the twin falls", "The box is hidden: the box of the twin has fallen")
     write_png(path, beside(seen, hidden))
 
 

@@ -13,12 +13,18 @@ from render import Photographer
 FIELD_OF_VIEW_DEG = 45.0
 """Vertical opening of RViz's view [deg]."""
 POINT_SIZE = "Size (Pixels)"
+WORLDS = "rpbi/markers"
+"""End of the topics on which worlds publish their bodies."""
+FLOORS = ("floor", "ground", "plane")
+"""Bodies that pictures do not show: RViz lights them from the camera, so they are dark in a view from the side."""
+GRID = {"Cell Size": 0.25, "Plane Cell Count": 40, "Color": "208; 213; 220", "Offset": {"X": 0.0, "Y": 0.0, "Z": 0.0}}
+"""Properties of the grid, which replaces the floor."""
 
 
 def rviz_content(
     config: Path, displays: Mapping[str, Mapping[str, Any] | None], view: Mapping[str, Any], scale: int = 2
 ) -> dict[str, Any]:
-    """Returns an RViz configuration without panels and images.
+    """Returns an RViz configuration without panels, images and floors, and with a fine grid instead of a floor.
 
     Args:
         config: The `.rviz` file.
@@ -43,6 +49,10 @@ def rviz_content(
         else:
             shown[name].update(properties)
     for each in shown.values():
+        if each["Class"] == "rviz/Grid":
+            each.update(GRID)
+        if str(each.get("Marker Topic", "")).endswith(WORLDS):
+            each["Namespaces"] = {**dict.fromkeys(FLOORS, False), **(each.get("Namespaces") or {})}
         if POINT_SIZE in each:
             each[POINT_SIZE] *= scale
     manager["Displays"] = [each for each in shown.values() if each["Class"] != "rviz/Image"]

@@ -14,7 +14,7 @@ import numpy as np
 import rospy
 from files import write_png
 from geometry_msgs.msg import Point, PoseStamped
-from labels import colour_image, depth_image, inset, label, legend
+from labels import colour_image, depth_image, inset, label, with_legend
 from nav_msgs.msg import Path as PathMessage
 from PIL import Image
 from render import Photographer, beside
@@ -76,7 +76,7 @@ def arrows_of(markers: MarkerArray) -> list[Any]:
 
 def demo(path: Path) -> None:
     """The arm pushes the box, with the camera's image."""
-    view = View((0.18, -0.02, 0.27), 1.15, 0.5, 2.2)
+    view = View((0.18, -0.02, 0.25), 1.1, 0.65, 2.2)
     hidden = {"kuka_lwr": False, "work_area": False}
     shown = {"Coloured depth": None, "TF": None, "World": {"Namespaces": hidden}}
     with Stage(1280, 720) as stage:
@@ -200,7 +200,7 @@ def drag(pixels: Sequence[Sequence[float]]) -> None:
 
 def dual_iiwa(path: Path) -> None:
     """Two arms on one station, and the circles that their hands have drawn."""
-    view = View((0.25, 0.0, 0.75), 2.0, 0.5, 0.4)
+    view = View((0.25, 0.0, 0.72), 1.9, 0.65, 0.4)
     arms = ("left", "right")
     style = {"Class": "rviz/Path", "Color": "30; 140; 60", "Line Style": "Billboards", "Line Width": 0.01}
     paths = {arm: {**style, "Topic": f"/pictures/{arm}"} for arm in arms}
@@ -253,14 +253,13 @@ def lfd_rviz(path: Path) -> None:
         stage.stop_world()
         picture = stage.still_picture()
     lines = (("#1f5fb4", "demonstration"), ("#9467bd", "plan"), ("#e07820", "box"), ("#66997f", "goal of the box"))
-    legend(picture, lines, (20, 20))
-    write_png(path, picture)
+    write_png(path, with_legend(picture, lines))
 
 
 def tutorial_rviz(path: Path) -> None:
     """The world of the tutorial, from the files on its page."""
     page = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
-    view = View((0.35, 0.0, 0.29), 1.48, 0.65, 5.55)
+    view = View((0.35, 0.0, 0.34), 1.65, 0.8, 5.55)
     with Stage(1280, 720) as stage, tempfile.TemporaryDirectory() as folder:
         for text, name in re.findall(r"```yaml\n(# (\S+).*?)```", page, flags=re.DOTALL):
             (Path(folder) / name).write_text(text, encoding="utf-8")

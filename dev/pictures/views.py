@@ -9,12 +9,13 @@ from typing import Any, TypeAlias
 import numpy as np
 import rospy
 from files import write_png
-from labels import label, legend
+from labels import label, with_legend
 from plots import empty_figure, save, show
 from rviz_view import rviz_camera
 from screen import PATIENCE_S, Stage, call, next_message, wait_until
 from sensor_msgs.msg import JointState
 
+from custom_ros_tools.plot_style import BLUE, ORANGE
 from ros_pybullet_interface.srv import ResetJointState
 from rpbi_mpc.msg import MpcStatus
 
@@ -24,7 +25,7 @@ States: TypeAlias = "dict[str, Any]"
 RVIZ = Path(__file__).resolve().parents[2] / "src/rpbi_examples/rviz"
 PUSHED_CYCLES = 75
 """Cycles of the controller before the picture, so that the box is in the first bend of the S."""
-PUSHING_VIEW = {"Distance": 0.5, "Focal_Point": {"X": 0.30, "Y": -0.18, "Z": 0.775}, "Pitch": 0.6, "Yaw": 5.9}
+PUSHING_VIEW = {"Distance": 0.42, "Focal_Point": {"X": 0.30, "Y": -0.19, "Z": 0.77}, "Pitch": 0.95, "Yaw": 0.6}
 PUSHING_LEGEND = (
     ("#33b24c", "path of the box, and reference"),
     ("#198ce6", "predicted path and outlines of the box"),
@@ -55,8 +56,7 @@ def draw_pushing_mpc(path: Path) -> None:
         next_message("mpc/status", MpcStatus, lambda status: status.cycle >= PUSHED_CYCLES)
         call("mpc/stop")
         picture = stage.still_picture()
-    legend(picture, PUSHING_LEGEND, (16, 16))
-    write_png(path, picture)
+    write_png(path, with_legend(picture, PUSHING_LEGEND))
 
 
 def draw_real_robot(path: Path) -> None:
@@ -76,7 +76,7 @@ def draw_real_robot(path: Path) -> None:
     left, right = figure.subfigures(1, 2, width_ratios=(1.5, 1.0))
     show(left.subplots(), picture)
     _draw_lag(right.subplots(), min(moves, key=_lag_s))
-    save(figure, path)
+    save(figure, path, has_photographs=True)
 
 
 def _moves() -> list[States]:
@@ -122,8 +122,8 @@ def _lag_s(states: States) -> float:
 
 
 def _draw_lag(axes: Any, states: States) -> None:
-    axes.plot(*np.transpose(states[TARGETS]), color="#e8731a", label="simulated arm: the target")
-    axes.plot(*np.transpose(states[MEASURED]), color="#22333f", label="stand-in, as measured")
+    axes.plot(*np.transpose(states[TARGETS]), color=ORANGE, label="simulated arm: the target")
+    axes.plot(*np.transpose(states[MEASURED]), color=BLUE, label="stand-in, as measured")
     half, (target_s, measured_s) = GOAL_RAD / 2.0, _half_times_s(states)
     axes.annotate("", (measured_s, half), (target_s, half), arrowprops={"arrowstyle": "<->"})
     axes.annotate(f"{_lag_s(states):.2f} s later", (measured_s, half), (8, -3), textcoords="offset points")

@@ -18,6 +18,7 @@ from rviz_worlds import PUSH_N, push_n
 from screen import Stage, call, next_message, wait_until
 from sensor_msgs.msg import JointState, Joy
 
+from custom_ros_tools.plot_style import INK
 from ros_pybullet_interface.msg import Contacts, SimulationState
 from ros_pybullet_interface.srv import ResetJointState
 
@@ -36,6 +37,8 @@ FIELDS = (
 )
 SHOWN_S = 8.0
 """Time that the live plot shows [s]."""
+GREY_FILL, GREY_LINE, BLUE_FILL = "#e8ecef", "#aeb8bf", "#e3eef6"
+"""Colours of a window's title bar and frame, and of the card with its message."""
 AFTER_S = 2.0
 """Time from a push of the box to the picture of the plot [s]."""
 
@@ -98,19 +101,23 @@ def devices(path: Path) -> None:
         wait_until(lambda: drag.message and drag.message.axes[0] > 0.4 and drag.message.axes[2] == 0.5, "it drags")
         dragged = framed("mouse", grab(mouse), drag.message)
         xdotool("mouseup", 1, "keyup", "Left", "keyup", "b")
-    write_png(path, beside(held, dragged, gap_px=20))
+    write_png(path, beside(held, dragged, gap_px=28))
 
 
 def framed(title: str, window: Image.Image, message: Joy) -> Image.Image:
-    """Returns a window with a frame, its title above, and the axes and buttons of its message below."""
-    whole = Image.new("RGB", (window.width + 2, window.height + 92), "white")
+    """Returns a window with a frame and its title, and below it the message that the node publishes."""
+    bar, card = 34, 76
+    whole = Image.new("RGB", (window.width + 2, bar + window.height + 12 + card + 1), "white")
     draw = ImageDraw.Draw(whole)
-    draw.text((0, 6), title, "black", font(18, bold=True))
-    whole.paste(window, (1, 35))
-    draw.rectangle((0, 34, window.width + 1, window.height + 35), outline="#a0a0a0")
+    draw.rounded_rectangle((0, 0, window.width + 1, bar + window.height + 1), 8, GREY_FILL, GREY_LINE)
+    draw.text((12, bar // 2), title, INK, font(16, bold=True), anchor="lm")
+    whole.paste(window, (1, bar))
+    top = bar + window.height + 12
+    draw.rounded_rectangle((0, top, window.width + 1, top + card), 8, BLUE_FILL)
     axes = ", ".join(f"{each:g}" for each in message.axes)
-    draw.text((0, window.height + 42), f"joy/axes: [{axes}]", "black", font(16))
-    draw.text((0, window.height + 66), f"joy/buttons: {list(message.buttons)}", "black", font(16))
+    rows = ("topic joy", f"axes: [{axes}]", f"buttons: {list(message.buttons)}")
+    for number, row in enumerate(rows):
+        draw.text((12, top + 8 + 22 * number), row, INK, font(15, bold=number == 0))
     return whole
 
 

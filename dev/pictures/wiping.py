@@ -10,6 +10,7 @@ from overlay import Overlay
 from plots import empty_figure, save, show
 from render import Photographer
 
+from custom_ros_tools.plot_style import BLUE, ORANGE
 from robot_model.geometry import Pose, Vector
 from rpbi.samples import ContactsSample
 from rpbi.world import World
@@ -40,21 +41,21 @@ def draw_wiping(path: Path) -> None:
     view = Overlay(CAMERA, CAMERA.picture(world))
     world.close()
     points = [each.point for each in touches if each.point is not None]
-    view.line(points, "#1f77b4", 3.0)
+    view.line(points, BLUE, 3.0)
     x, y, z = points[-1]
-    view.arrow((x, y, z), (x, y, z + METRES_A_NEWTON * touches[-1].force_n), "#d62728", 7.0)
-    view.words((x, y, z + METRES_A_NEWTON * touches[-1].force_n), f"{touches[-1].force_n:.1f} N", "#d62728", (14, 4))
-    view.words(points[len(points) // 2], "path of the tip", "#1f77b4", (16, 18))
+    view.arrow((x, y, z), (x, y, z + METRES_A_NEWTON * touches[-1].force_n), ORANGE, 7.0)
+    view.words((x, y, z + METRES_A_NEWTON * touches[-1].force_n), f"{touches[-1].force_n:.1f} N", ORANGE, (14, 4))
+    view.words(points[len(points) // 2], "path of the tip", BLUE, (16, 18))
     figure = empty_figure((10.6, 4.8))
     left, right = figure.subplots(1, 2, width_ratios=(1.05, 1.0))
     show(left, view.picture())
     _draw_force(right, touches)
-    save(figure, path)
+    save(figure, path, has_photographs=True)
 
 
 def _draw_force(axes: Any, touches: Sequence[Touch]) -> None:
     touched_s = next(each.time_s for each in touches if each.force_n > 0.0)
-    axes.plot([each.time_s for each in touches], [each.force_n for each in touches], color="#d62728")
+    axes.plot([each.time_s for each in touches], [each.force_n for each in touches], color=ORANGE)
     axes.axhline(FORCE_N, color="0.3", lw=1.0, ls="--")
     axes.text(SHOWN_S - 0.1, FORCE_N + 1.0, f"configured: {FORCE_N:g} N", color="0.3", ha="right")
     for begin_s, end_s, word in ((0.0, touched_s, "moves\ndown"), (touched_s + SETTLING_S, SHOWN_S, "wipes")):

@@ -1,7 +1,7 @@
 """Reads hostile bags with each reader of bags, and prints a table of the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/bags.py'`, it reads 1,000 of them with each reader and with replay, each
-in a process of its own; the table in docs/security.md is its.
+in a process of its own; the table in docs/security_tests.md is its.
 """
 
 from __future__ import annotations

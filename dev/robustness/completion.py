@@ -1,7 +1,7 @@
 """Completes hostile launch files and answers of rogue nodes in bash, and prints a table of the outcomes.
 
 Run it by `./rpbi shell -c 'python3 dev/robustness/completion.py'`; it exits with 1 if code ran, a program printed a
-traceback, or a completion took more than 60 s or 2 GB. The table in docs/security.md is its.
+traceback, or a completion took more than 60 s or 2 GB. The table in docs/security_tests.md is its.
 """
 
 from __future__ import annotations

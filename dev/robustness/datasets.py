@@ -1,7 +1,7 @@
 """Checks hostile data sets with `check_dataset`, and prints a table of the outcomes.
 
 Run by `./rpbi shell -c 'nice -n 19 python3 dev/robustness/datasets.py'`, it checks 500 of each format, each in a
-process of its own; the table in docs/security.md is its.
+process of its own; the table in docs/security_tests.md is its.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Reads hostile folders with each reader of episodes, and prints a table of the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/episode_folders.py'`, it reads 1,000 of them with each reader, each in a
-process of its own; the table in docs/security.md is its.
+process of its own; the table in docs/security_tests.md is its.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Reads hostile `.world` files with each of their readers, and prints a table of the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/states.py'`, it reads 300 of them with each reader, each in a process of
-its own. `states_in_node.py` has a running simulator restore them. The table in docs/security.md is theirs.
+its own. `states_in_node.py` has a running simulator restore them. The table in docs/security_tests.md is theirs.
 """
 
 from __future__ import annotations

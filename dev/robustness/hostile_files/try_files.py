@@ -1,7 +1,7 @@
 """Reads many broken and hostile files, each in its own process, and prints a table of the results.
 
 URDFs, meshes and YAML files are read by the program behind `./rpbi check` and by the simulator node, bags by our tools.
-Run it by `./rpbi shell -c 'python3 dev/robustness/hostile_files/try_files.py'`; the table in docs/security.md is its.
+Run it by `./rpbi shell -c 'python3 dev/robustness/hostile_files/try_files.py'`; its table is in docs/security_tests.md.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from custom_ros_tools.plot_style import BLUE, GREEN, GREY, INK, ORANGE, plot_style
 from motion_primitives import Demonstration, ObstacleCoupling, ViaPoint, make_primitive
 
 TIMES = np.linspace(0.0, 4.0, 401)
@@ -20,22 +21,22 @@ SHOWN = np.stack([0.5 * SHARE, 0.12 * np.sin(np.pi * SHARE) + 0.1 * SHARE, 0.0 *
 
 def draw_dmp(axes):
     primitive = make_primitive("dmp", {}).learn(Demonstration.of(TIMES, SHOWN))
-    axes.plot(*SHOWN.T[:2], "k--", label="demonstration")
+    axes.plot(*SHOWN.T[:2], "--", color=INK, label="demonstration")
     for x, y in ((0.55, -0.1), (0.6, 0.05), (0.55, 0.25)):
-        axes.plot(*primitive.plan(goal=[x, y, 0.0]).positions.T[:2], "C0", lw=1)
-        axes.plot(x, y, "C0o")
-    axes.plot([], [], "C0o-", lw=1, label="other goals")
+        axes.plot(*primitive.plan(goal=[x, y, 0.0]).positions.T[:2], color=BLUE, lw=1.2)
+        axes.plot(x, y, "o", color=BLUE)
+    axes.plot([], [], "o-", color=BLUE, lw=1.2, label="other goals")
     motion, path = primitive.begin(), []
     while not motion.is_at_goal():
         if len(path) == 180:
             motion.set_goal([0.35, -0.1, 0.0])
         path.append(motion.step(0.01).point)
-    axes.plot(*np.array(path).T[:2], "C1", label="another goal half-way")
+    axes.plot(*np.array(path).T[:2], color=ORANGE, label="another goal half-way")
     ball = ObstacleCoupling([0.22, 0.155, 0.0], 0.04)
-    axes.add_patch(plt.Circle(ball.center[:2], ball.radius_m, color="0.8"))
-    axes.plot(*primitive.plan(couplings=[ball]).positions.T[:2], "C3", label="around an obstacle")
+    axes.add_patch(plt.Circle(ball.center[:2], ball.radius_m, color=GREY, alpha=0.5))
+    axes.plot(*primitive.plan(couplings=[ball]).positions.T[:2], color=GREEN, label="around an obstacle")
     axes.set(title="dmp: one demonstration", xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axes.legend(fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 
 
 def draw_promp(axes):
@@ -46,28 +47,29 @@ def draw_promp(axes):
         shown.append(SHOWN + np.outer(np.sin(np.pi * SHARE), [0, bump, 0]) + np.outer(SHARE, [0, end, 0]))
     primitive = make_primitive("promp", {"prior": 0.1}).learn([Demonstration.of(TIMES, each) for each in shown])
     for each in shown:
-        axes.plot(TIMES, each[:, 1], "k", lw=0.5)
-    axes.plot([], [], "k", lw=0.5, label="demonstrations")
+        axes.plot(TIMES, each[:, 1], color=INK, lw=0.7)
+    axes.plot([], [], color=INK, lw=0.7, label="demonstrations")
     via = [ViaPoint(0.5, [0.25, 0.22, 0.0])]
     progress = np.linspace(0.0, 1.0, 101)
     for color, label, distribution in (
-        ("C0", "all motions, two standard deviations", primitive.distribution),
-        ("C1", "those through a via-point", primitive.conditioned(via)),
+        (BLUE, "all motions, two standard deviations", primitive.distribution),
+        (ORANGE, "those through a via-point", primitive.conditioned(via)),
     ):
         mean = np.array([primitive.mean_at(distribution, u)[0][1] for u in progress])
         std = primitive.stds(progress, distribution)[:, 1]
         axes.fill_between(4.0 * progress, mean - 2 * std, mean + 2 * std, color=color, alpha=0.3, lw=0, label=label)
-        axes.plot(4.0 * progress, mean, color)
-    axes.plot(2.0, 0.22, "C3o")
+        axes.plot(4.0 * progress, mean, color=color)
+    axes.plot(2.0, 0.22, "o", color=INK)
     axes.set(title="promp: six demonstrations", xlabel="time [s]", ylabel="y [m]")
-    axes.legend(fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 
 
+@plot_style()
 def main(path):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
     draw_dmp(left)
     draw_promp(right)
-    figure.savefig(path, dpi=100)
+    figure.savefig(path)
 
 
 if __name__ == "__main__":

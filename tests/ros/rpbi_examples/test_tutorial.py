@@ -90,4 +90,4 @@ def test_path_of_the_lifted_box_is_a_table_and_plot(followed):
     assert path.iloc[0].tolist() == pytest.approx([0.5, 0.0, 0.225], abs=0.001)
     assert path.iloc[-1].tolist() == pytest.approx([0.5, 0.1, 0.475], abs=0.002)
     with Image.open(folder / "path.png") as image:
-        assert image.size == (640, 480)
+        assert image.size == (1600, 800)

@@ -13,10 +13,10 @@ import numpy as np  # noqa: E402
 import numpy.typing as npt  # noqa: E402
 import pandas as pd  # noqa: E402
 
+from custom_ros_tools.plot_style import BLUE, INK, ORANGE, X, Y, Z, legend_beside, plot_style  # noqa: E402
+
 ENOUGH = 0.95
 """Share of the expected rate that a topic's measured rate must reach."""
-RED, GREEN, BLUE = "#d62728", "#2ca02c", "#1f77b4"
-"""Colours of the axes x, y and z, as RViz has them."""
 MIN_SPAN_RAD = 0.2
 """Smallest height of a joint's plot [rad or m], so that the noise of a joint at rest is not magnified."""
 
@@ -60,6 +60,7 @@ def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame({"rms": np.sqrt((error**2).mean()), "max": error.abs().max()})
 
 
+@plot_style()
 def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None:
     """Writes a picture of positions and targets over time, for all joints that have targets."""
     columns = [column for column in targets.columns if column.startswith("position/")]
@@ -67,18 +68,18 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
     size = (9, 1.3 * len(columns) + 1)
     figure, axes = plt.subplots(len(columns), sharex=True, figsize=size, squeeze=False, layout="constrained")
     for axis, column in zip(axes[:, 0], columns, strict=True):
-        axis.plot(targets.index - start_s, targets[column], color="#e8731a", lw=2.2, label="target")
-        axis.plot(states.index - start_s, states[column], color="#22333f", lw=1.0, label="position")
+        axis.plot(targets.index - start_s, targets[column], color=ORANGE, lw=2.2, label="target")
+        axis.plot(states.index - start_s, states[column], color=INK, lw=1.0, label="position")
         axis.set_ylabel(column.removeprefix("position/").removesuffix("_joint") + "\n[rad]", fontsize=9)
         low, high = axis.get_ylim()
         half = max((high - low) / 2.0, MIN_SPAN_RAD / 2.0)
         axis.set_ylim((low + high) / 2.0 - half, (low + high) / 2.0 + half)
-        axis.grid(alpha=0.3)
     axes[-1, 0].set_xlabel("simulated time [s]")
-    axes[-1, 0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.5), ncols=2, frameon=False)
+    axes[-1, 0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.5), ncols=2)
     _save(figure, path, "Joint positions and their targets")
 
 
+@plot_style()
 def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
     """Writes a picture of the motor efforts of the given joints over time."""
     figure, axis = plt.subplots(figsize=(9, 4), layout="constrained")
@@ -86,8 +87,7 @@ def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
         axis.plot(states.index - states.index[0], states[f"effort/{joint}"], lw=1.0, label=joint)
     axis.set_xlabel("simulated time [s]")
     axis.set_ylabel("effort [N m]")
-    axis.grid(alpha=0.3)
-    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    legend_beside(axis)
     _save(figure, path, "Motor efforts")
 
 
@@ -113,6 +113,7 @@ def force_figures(push: pd.Series) -> dict[str, float]:
     return {"push_mean_n": round(float(touching.mean()), 2), "push_max_n": round(float(touching.max()), 2)}
 
 
+@plot_style()
 def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
     """Writes a picture with the push on the box, the floor's friction limit, and the force in the wrist over time [N].
 
@@ -125,19 +126,18 @@ def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start
         path: Picture file to write.
     """
     figure, (above, below) = plt.subplots(2, sharex=True, figsize=(10, 5.4), layout="constrained")
-    above.plot(friction.index - start_s, friction, color="#22333f", lw=3.0, alpha=0.35, label="friction limit mu N")
-    above.plot(push.index - start_s, push, color="#e8731a", lw=1.4, label="arm on the box")
+    above.plot(friction.index - start_s, friction, color=INK, lw=3.0, alpha=0.35, label="friction limit \u03bc N")
+    above.plot(push.index - start_s, push, color=BLUE, lw=1.4, label="arm on the box")
     above.set_ylabel("force on the box [N]")
-    for axis, colour in zip("xyz", (RED, GREEN, BLUE)):
+    for axis, colour in zip("xyz", (X, Y, Z)):
         below.plot(wrist.index - start_s, wrist[f"wrench/force/{axis}"], color=colour, lw=1.4, label=axis)
     below.set_ylabel("force in the wrist [N]")
     below.set_xlabel("simulated time [s]")
     for part in (above, below):
-        part.grid(alpha=0.3)
         for begin_s, end_s in _contact_times(push):
-            part.axvspan(begin_s - start_s, end_s - start_s, color="#e8731a", alpha=0.12, lw=0, label="arm pushes")
+            part.axvspan(begin_s - start_s, end_s - start_s, color=BLUE, alpha=0.1, lw=0, label="arm pushes")
         handles = dict(zip(*reversed(part.get_legend_handles_labels())))  # one entry for all pushes
-        part.legend(handles.values(), handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+        part.legend(handles.values(), handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
     _save(figure, path, "Push of the arm on the box, and force-torque sensor in the wrist")
 
 
@@ -153,6 +153,7 @@ def save_colour(pixels: npt.NDArray[np.uint8], path: Path) -> None:
     plt.imsave(path, pixels)
 
 
+@plot_style()
 def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> None:
     """Writes a picture of a depth image.
 
@@ -224,6 +225,6 @@ def as_text(summary: Mapping[str, Any]) -> str:
 
 
 def _save(figure: Any, path: Path, title: str) -> None:
-    figure.suptitle(title, fontsize=12)
-    figure.savefig(path, dpi=110)
+    figure.suptitle(title, fontsize=12, x=0.01, ha="left")
+    figure.savefig(path)
     plt.close(figure)

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from custom_ros_tools.plot_style import BLUE, INK, ORANGE, PURPLE, YELLOW, legend_beside, plot_style
+
 TOUCHED_M = 0.001
 """Least depth of the tool in the box that counts as contact [m]."""
 RELEASED_S = 0.5
@@ -156,6 +158,7 @@ class Press:
             table.writerow(PressSample._fields)
             table.writerows([f"{value:.6f}" for value in sample] for sample in self.samples)
 
+    @plot_style()
     def draw(self, figure: object) -> None:
         """Draws forces and heights over time.
 
@@ -166,24 +169,24 @@ class Press:
         upper, lower = figure.subplots(2, 1, sharex=True)  # type: ignore[attr-defined]
         times_s = [each.time_s for each in self.samples]
         forces = {"on the tool,\nmeasured in the wrist": "measured_n", "on the handle,\nfelt by the hand": "felt_n"}
-        for (label, name), colour in zip(forces.items(), ("tab:orange", "tab:purple")):
+        for (label, name), colour in zip(forces.items(), (ORANGE, PURPLE)):
             upper.plot(times_s, [getattr(each, name) for each in self.samples], color=colour, label=label)
         upper.set_ylabel("force upwards [N]")
-        lower.plot(times_s, [1e3 * each.tool_z for each in self.samples], color="tab:blue", label="tool")
-        lower.plot(times_s, [1e3 * each.target_z for each in self.samples], "--", color="0.35", label="its target")
+        lower.plot(times_s, [1e3 * each.tool_z for each in self.samples], color=BLUE, label="tool")
+        lower.plot(times_s, [1e3 * each.target_z for each in self.samples], "--", color=INK, label="its target")
         low_mm, touch_mm = lower.get_ylim()[0], 1e3 * self._touch_height
-        lower.axhspan(low_mm, touch_mm, color="tab:brown", alpha=0.15, lw=0, label="tool in the box")
+        lower.axhspan(low_mm, touch_mm, color=YELLOW, alpha=0.15, lw=0, label="tool in the box")
         lower.set_ylim(bottom=low_mm)
         lower.set_ylabel("height [mm]")
         lower.set_xlabel("time [s]")
         for axes in (upper, lower):
-            axes.grid(alpha=0.3)
-            axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+            legend_beside(axes)
 
+    @plot_style()
     def write_figure(self, path: Path) -> None:
         """Draws the press, and writes the figure to a PNG file."""
         from matplotlib.figure import Figure  # importing it takes half a second; other callers need not wait for it
 
-        figure = Figure(figsize=(9.0, 5.0), dpi=120, layout="constrained")
+        figure = Figure(figsize=(9.0, 5.0), layout="constrained")
         self.draw(figure)
         figure.savefig(path)

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from custom_ros_tools.plot_style import GREY, INK, X, Y, Z, legend_beside, plot_style
 from custom_ros_tools.transforms import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-RED, GREEN, BLUE = "#d62728", "#2ca02c", "#1f77b4"
-"""Colours of the axes x, y and z, as RViz has them."""
 PLAN, TIP = {"lw": 4.0, "alpha": 0.35}, {"lw": 1.4}
 """Lines of the plan, which is wide and pale, and of the tip."""
 
 
+@plot_style()
 def draw_motion(
     figure: Figure | SubFigure,
     rows: Sequence[tuple[float, Array, Array]],
@@ -37,12 +37,12 @@ def draw_motion(
     seconds = np.array([row[0] for row in rows])
     for index, (style, name) in enumerate(((PLAN, "plan"), (TIP, "tip")), 1):
         places = np.array([row[index] for row in rows])
-        for axis, place, colour in zip("xyz", places.T, (RED, GREEN, BLUE)):
+        for axis, place, colour in zip("xyz", places.T, (X, Y, Z)):
             upper.plot(seconds, place, color=colour, label=axis if name == "tip" else None, **style)
         speed = np.linalg.norm(np.gradient(places, seconds, axis=0), axis=1)
-        lower.plot(seconds, speed, color="0.15", label=name, **style)
-    upper.plot(times_s, waypoints[0], "o", color="0.15", label="waypoints")
-    upper.plot(times_s, waypoints[1:].T, "o", color="0.15")
+        lower.plot(seconds, speed, color=INK, label=name, **style)
+    upper.plot(times_s, waypoints[0], "o", color=INK, label="waypoints")
+    upper.plot(times_s, waypoints[1:].T, "o", color=INK)
     upper.set(ylabel="position [m]")
     lower.set(ylabel="speed [m/s]", xlabel="time [s]", ylim=(0.0, None))
     for axes in (upper, lower):
@@ -51,6 +51,5 @@ def draw_motion(
 
 def _finish(axes: Axes, times_s: Sequence[float]) -> None:
     for time_s in times_s:
-        axes.axvline(time_s, color="0.6", lw=1.0, ls=":")
-    axes.grid(alpha=0.3)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+        axes.axvline(time_s, color=GREY, lw=1.0, ls=":")
+    legend_beside(axes)

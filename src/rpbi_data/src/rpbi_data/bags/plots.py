@@ -140,6 +140,5 @@ def _draw(axes: Axes, lines: Lines) -> None:
         values = line.dropna()
         values = values.iloc[:: len(values) // MAX_POINTS + 1]
         axes.plot(values.index, values, label=name, linewidth=1.0)
-    axes.grid(alpha=0.3)
     if len(lines) <= MAX_LINES:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")

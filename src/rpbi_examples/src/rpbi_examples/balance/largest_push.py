@@ -14,6 +14,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from custom_ros_tools.plot_style import ORANGE, plot_style
 from rpbi.gym.env import WorldEnv
 from rpbi_examples.scenes.scene import run_scene
 from rpbi_examples.scenes.talos import IMPULSE, Talos
@@ -83,6 +84,7 @@ def pushes_in(text: str) -> dict[str, float]:
     return {name: float(match[1]) for name, match in found.items() if match}
 
 
+@plot_style()
 def draw(pushes: Mapping[str, float], path: Path) -> None:
     """Writes a polar plot of the largest impulses [N s]. The robot is seen from above and faces up.
 
@@ -90,21 +92,23 @@ def draw(pushes: Mapping[str, float], path: Path) -> None:
         pushes: Largest impulse [N s], indexed by direction.
         path: Picture file to write.
     """
-    figure = Figure(figsize=(4.8, 4.8), layout="constrained")
+    figure = Figure(figsize=(5.2, 5.2), layout="constrained")
     axes = figure.add_subplot(projection="polar")
     axes.set_theta_zero_location("N")
     angles = [math.radians(45.0 * DIRECTIONS.index(name)) for name in pushes]
     impulses = list(pushes.values())
     axes.fill(angles, impulses, alpha=0.25)
     axes.plot([*angles, angles[0]], [*impulses, impulses[0]], "o-")
-    axes.plot([math.radians(each) for each in range(361)], [IMPULSE] * 361, "--", color="grey", label="in the scene")
+    axes.plot(
+        [math.radians(each) for each in range(361)], [IMPULSE] * 361, "--", color=ORANGE, label="push of the scene"
+    )
     axes.set_xticks(angles, [f"{name}\n{impulse:g}" for name, impulse in pushes.items()])
     axes.tick_params(axis="x", pad=16)
     axes.set_yticks([10, 20, 30, 40])
     axes.set_rlabel_position(112.5)
-    axes.set_title("Largest push that a Talos withstands [N s]")
+    axes.set_title("Largest push that a Talos withstands [N s]", loc="center")
     axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.15))
-    figure.savefig(path, dpi=120)
+    figure.savefig(path)
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 import rpbi_examples.gym  # registers the environments
+from custom_ros_tools.plot_style import plot_style
 
 from .cross_entropy import Array, CrossEntropy, LinearPolicies, run_episodes
 
@@ -91,20 +92,19 @@ def _line(progress: Progress) -> str:
     return f"{actions:7d} actions, {seconds:4.0f} s, return {score:6.2f}, success {100 * success:3.0f} %"
 
 
+@plot_style()
 def draw(progress: list[Progress], file: Path) -> None:
     """Writes a picture of the test returns and successes over the number of training actions."""
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, (score, success) = pyplot.subplots(2, 1, sharex=True, figsize=(7.0, 4.5), layout="constrained")
+    figure, (score, success) = pyplot.subplots(2, 1, sharex=True, figsize=(8.0, 4.4), layout="constrained")
     actions = [each.actions / 1000 for each in progress]
-    score.plot(actions, [each.score for each in progress], "o-", ms=3, color="tab:blue")
-    score.set(ylabel="return", title=f"{ENVIRONMENT}: test episodes of the mean policy")
-    success.plot(actions, [100 * each.success for each in progress], "o-", ms=3, color="tab:green")
+    score.plot(actions, [each.score for each in progress], "o-", ms=4)
+    score.set(ylabel="return", title=f"{ENVIRONMENT}: means of {TESTS} test episodes")
+    success.plot(actions, [100 * each.success for each in progress], "o-", ms=4)
     success.set(xlabel="actions used to learn [thousands]", ylabel="success [%]", ylim=(-3, 103))
-    for axes in (score, success):
-        axes.grid(alpha=0.3)
-    figure.savefig(file, dpi=110)
+    figure.savefig(file)
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from custom_ros_tools.files import atomic_file
+from custom_ros_tools.plot_style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, SKY, plot_style
 from custom_ros_tools.transforms import Array
 from rpbi_examples.motions import PlanarPose
 
@@ -25,10 +26,10 @@ NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
 """Largest distance [m] and angle [rad] from the goal at which the box counts as at its goal."""
 SHOWN_SHARE = 2.0 / 3.0
 """A demonstration counts as good within this share of `NEAR_M` and `NEAR_RAD`, since an execution adds errors."""
-TIP, BOX, GOAL = "#1f5fb4", "#e67814", "#2ca02c"
+TIP, BOX, GOAL = BLUE, ORANGE, GREEN
 SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
-SIZE, DPI = (15.0, 8.4), 100
+SIZE = (13.0, 8.4)
 BESIDE = 0.025
 """Width of the labels next to a plot, as a share of the figure."""
 
@@ -132,6 +133,7 @@ def write_tables(table: pd.DataFrame, path: Path) -> None:
         table.to_csv(part, float_format="%.6g")
 
 
+@plot_style()
 def write_picture(figure: Figure, path: Path) -> None:
     """Writes a figure to a picture file.
 
@@ -139,19 +141,21 @@ def write_picture(figure: Figure, path: Path) -> None:
         OSError: If the file cannot be written.
     """
     with atomic_file(path) as part:
-        figure.savefig(part, dpi=DPI)
+        figure.savefig(part)
 
 
+@plot_style()
 def draw_paths(figure: Figure, goal: PlanarPose, shown: Run, executed: Sequence[Run]) -> None:
     """Draws a demonstration and all executions as seen from above. Only the last execution is drawn in detail."""
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     _draw_run(left, goal, shown, f"demonstration: box {shown.error}")
     for run in executed[:-1]:
-        right.plot(run.table["tip/x"], run.table["tip/y"], color="0.75", linewidth=0.8)
+        right.plot(run.table["tip/x"], run.table["tip/y"], color=PALE, linewidth=1.0)
     right.plot(shown.table["tip/x"], shown.table["tip/y"], label="demonstration", **SHOWN_STYLE)
     _draw_run(right, goal, executed[-1], f"execution {len(executed)}: box {executed[-1].error}")
 
 
+@plot_style()
 def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -> None:
     """Draws six plots, from the operator's signal to the executed plan, and connects the plots with arrows."""
     assert executed.plan is not None
@@ -163,7 +167,7 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
         signal.plot(seconds, shown.table[key], color=colour, label=f"{key[-1]}", drawstyle="steps-post")
     signal.set(title="1  operator: signal h", xlabel="time [s]", ylabel="velocity [m/s]")
     _draw_run(where, goal, shown, "2  demonstration: tip u and box x")
-    for key, colour in (("tip/x", TIP), ("tip/y", GOAL), ("box/x", BOX), ("box/y", "#8c564b")):
+    for key, colour in (("tip/x", TIP), ("tip/y", GOAL), ("box/x", BOX), ("box/y", PURPLE)):
         states.plot(seconds, shown.table[key], color=colour, label=key)
     states.set(title=f"3  rosbag to DataFrame: {len(shown.table)} rows", xlabel="time [s]", ylabel="[m]")
     moved_s = plan.times - plan.push_s + _push_begins(shown, plan)
@@ -172,16 +176,14 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
             seconds, shown.table[f"tip/{axis}"], color=colour, alpha=0.35, linewidth=4.0, label=f"shown {axis}"
         )
         learned.plot(moved_s, plan.places[:, "xy".index(axis)], color=colour, label=f"DMP {axis}")
-    learned.axvline(moved_s[0] + plan.push_s, color="0.5", linewidth=1.0, linestyle=":")
+    learned.axvline(moved_s[0] + plan.push_s, color=GREY, linewidth=1.0, linestyle=":")
     learned.set(title="4  learned: approach | push", xlabel="time [s]", ylabel="[m]")
     planned.plot(shown.table["tip/x"], shown.table["tip/y"], label="demonstration", **SHOWN_STYLE)
     _draw_plan(planned, plan)
     _map(planned, goal, "5  plan from a random start")
     _draw_run(execution, goal, executed, f"6  executed: box {executed.error}", with_plan=False)
-    for axes in (signal, states, learned):
-        axes.grid(alpha=0.3)
     for axes in grid.flat:
-        axes.legend(fontsize=7, loc="best")
+        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
     figure.get_layout_engine().set(w_pad=0.25, h_pad=0.12)
     figure.draw_without_rendering()
     for begin, end in ((signal, where), (where, states), (states, learned), (learned, planned), (planned, execution)):
@@ -203,23 +205,22 @@ def _draw_run(axes: Axes, goal: PlanarPose, run: Run, title: str, with_plan: boo
     axes.plot([box.x for box in boxes], [box.y for box in boxes], color=BOX, linewidth=0.8)
     if run.plan is not None and with_plan:
         _draw_plan(axes, run.plan)
-    axes.plot(table["tip/x"], table["tip/y"], color=TIP if run.plan is None else "#d62728", linewidth=1.2, label="tip")
-    axes.plot(table["tip/x"].iloc[:1], table["tip/y"].iloc[:1], "o", color="#222222", markersize=5, label="start")
+    axes.plot(table["tip/x"], table["tip/y"], color=TIP if run.plan is None else PURPLE, linewidth=1.4, label="tip")
+    axes.plot(table["tip/x"].iloc[:1], table["tip/y"].iloc[:1], "o", color=INK, markersize=5, label="start")
     _map(axes, goal, title)
-    axes.legend(fontsize=8, loc="lower left")
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
 
 
 def _draw_plan(axes: Axes, plan: PushPlan) -> None:
     is_push = plan.times >= plan.push_s
-    axes.plot(*plan.places[~is_push].T, color="#9467bd", linewidth=2.5, alpha=0.6, label="planned approach")
-    axes.plot(*plan.places[is_push].T, color="0.4", linewidth=2.5, alpha=0.5, label="planned push")
+    axes.plot(*plan.places[~is_push].T, color=SKY, linewidth=2.8, label="planned approach")
+    axes.plot(*plan.places[is_push].T, color=GREY, linewidth=2.8, label="planned push")
 
 
 def _map(axes: Axes, goal: PlanarPose, title: str) -> None:
     axes.fill(*_outline(goal).T, color=GOAL, alpha=0.2, label="goal")
     axes.set(xlabel="x, to the right [m]", ylabel="y, away from the person [m]", aspect="equal")
     axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
 
 
 def _outline(box: PlanarPose) -> Array:
@@ -240,6 +241,6 @@ def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
     else:
         tail, head = (one.x0 - 2.0 * BESIDE, y), (other.x1 + BESIDE / 4.0, y)
     arrow = FancyArrowPatch(
-        tail, head, transform=figure.transFigure, arrowstyle="simple", mutation_scale=22, color="0.3"
+        tail, head, transform=figure.transFigure, arrowstyle="simple", mutation_scale=22, color=GREY
     )
     figure.add_artist(arrow)

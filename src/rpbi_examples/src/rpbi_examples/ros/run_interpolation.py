@@ -114,13 +114,13 @@ class RunInterpolation:
             return
         from matplotlib.figure import Figure  # importing it takes half a second, only needed for a picture
 
-        figure = Figure(figsize=(9.0, 6.0), dpi=120, layout="constrained")
+        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
         draw_motion(figure, self._rows, times_s, positions)
         path = Path(rospy.get_param("~working_directory", ".").strip(), name)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with atomic_file(path) as part:
-                figure.savefig(part)
+                figure.savefig(part, dpi=200)
         except (OSError, ValueError) as error:
             raise InterfaceError(f"plot: expected a picture file that can be written, got '{path}': {error}") from error
         rospy.loginfo("the motion is drawn in %s", path)

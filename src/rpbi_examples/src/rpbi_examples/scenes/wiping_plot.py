@@ -15,14 +15,17 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from custom_ros_tools.plot_style import BLUE, GREY, PALE, legend_beside, plot_style
+
 from .parts.lanes import ways_along
 from .scene import SceneResult
 from .task import SceneTask, make_env, run_episode
 from .wiping import SIZE_M, STAIN_M, TOLERANCE, Wiping
 
-BLUE, INK, WIPED = "#1f5fb4", "#29479e", "#cfe8cf"
+STAIN, WIPED = "#29479e", "#cfe8dd"
 
 
+@plot_style()
 def draw(scene: Wiping, result: SceneResult, title: str, file: Path) -> None:
     """Writes a picture of an episode that has ended: the force in the upper plot, the board in the lower plot."""
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
@@ -30,7 +33,7 @@ def draw(scene: Wiping, result: SceneResult, title: str, file: Path) -> None:
     figure.suptitle(f"{title}: {'succeeded' if result.success else f'failed {result.reason}'}")
     draw_force(scene, force, result.figures["way within 10 % [%]"])
     draw_board(scene, board, result.figures["coverage [%]"])
-    figure.savefig(file, dpi=110)
+    figure.savefig(file)
 
 
 def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
@@ -42,15 +45,15 @@ def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
         share: Share of the path with the held force [%].
     """
     low, high = ((1.0 + side * TOLERANCE) * scene.force for side in (-1.0, 1.0))
-    axes.axhspan(low, high, color="0.92", label=f"within 10 %:\n{share:.1f} % of the path")
-    axes.axhline(scene.force, color="0.5", lw=1, ls="--", label=f"requested: {scene.force:.1f} N")
+    axes.axhspan(low, high, color=PALE, label=f"within 10 %:\n{share:.1f} % of the path")
+    axes.axhline(scene.force, color=GREY, lw=1, ls="--", label=f"requested: {scene.force:.1f} N")
     if scene.stamps:
         axes.plot(ways_along(scene.stamps), scene.forces, color=BLUE, label=f"mean: {np.mean(scene.forces):.2f} N")
     axes.set(
         xlabel="distance along the path [m]", ylabel="normal force [N]", ylim=(0.8 * scene.force, 1.2 * scene.force)
     )
     axes.margins(x=0.01)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    legend_beside(axes)
 
 
 def draw_board(scene: Wiping, axes: Axes, share: float) -> None:
@@ -68,7 +71,7 @@ def draw_board(scene: Wiping, axes: Axes, share: float) -> None:
         x, y, _ = np.array(scene.stamps).T
         axes.plot(y, x, color=BLUE, lw=1)
     for name, (x, y) in scene.stains.items():
-        axes.add_patch(Circle((y, x), STAIN_M, ec=INK, fc=INK if name in scene.left else "none"))
+        axes.add_patch(Circle((y, x), STAIN_M, ec=STAIN, fc=STAIN if name in scene.left else "none"))
     gone = len(scene.stains) - len(scene.left)
     axes.set(
         title=f"wiped: {share:.1f} % of the area, {gone} of {len(scene.stains)} stains",

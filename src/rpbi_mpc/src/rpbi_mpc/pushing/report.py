@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from custom_ros_tools.plot_style import BLUE, GREEN, GREY, INK, ORANGE, PALE, SKY, X, Y, legend_beside, plot_style
 from rpbi_mpc.loop import Cycle
 from rpbi_mpc.pushing.planar.model import SliderConfig
 from rpbi_mpc.records import summary_of, table_of
@@ -21,12 +22,11 @@ if TYPE_CHECKING:
 
 OUTLINES = 12
 """Number of outlines of the slider in the picture of the path."""
-RED, GREEN = "#d62728", "#2ca02c"
-"""Colours of the axes x and y, as RViz has them."""
 AHEAD_S = (0.4, 1.2)
 """Prediction times at which the predicted and the actual position of the slider are compared [s]."""
 
 
+@plot_style()
 def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingController) -> dict[str, Any]:
     """Writes `cycles.csv`, `summary.json`, `path.png`, `errors.png` and `cycles.png` to a folder. Returns the summary.
 
@@ -75,10 +75,6 @@ def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, An
     return figure, figure.subplots(rows, columns, sharex=rows > 1)
 
 
-def _legend_beside(axes: Any) -> None:
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-
-
 def _predicted(cycle: Cycle, ahead_s: float) -> np.ndarray:
     """Returns the slider's position x, y [m] that the plan of a cycle predicts. NaN without a prediction.
 
@@ -95,17 +91,17 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
     """Writes a picture of path, slider and pusher as seen from above."""
     figure, axes = _figure(1, 1, (8.5, 5.5))
     points = controller.path.points
-    axes.plot(*points.T, color="tab:green", lw=2, label="path")
+    axes.plot(*points.T, color=GREEN, lw=2, label="path")
     seen = table.dropna(subset=["state.x"])
-    axes.plot(seen["state.x"], seen["state.y"], color="tab:orange", label="slider")
-    axes.plot(seen["measured.pusher_x"], seen["measured.pusher_y"], color="0.4", lw=1, label="pusher")
+    axes.plot(seen["state.x"], seen["state.y"], color=ORANGE, label="slider")
+    axes.plot(seen["measured.pusher_x"], seen["measured.pusher_y"], color=INK, lw=1, label="pusher")
     for row in seen.iloc[np.linspace(0, len(seen) - 1, OUTLINES).astype(int)].itertuples(index=False):
         record = dict(zip(seen.columns, row))
         outline = _outline(np.array([record[f"state.{name}"] for name in ("x", "y", "yaw")]), controller.config.slider)
-        axes.plot(*outline.T, color="tab:orange", alpha=0.45, lw=1)
+        axes.plot(*outline.T, color=ORANGE, alpha=0.45, lw=1)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    _legend_beside(axes)
-    figure.savefig(file, dpi=120, bbox_inches="tight")
+    legend_beside(axes)
+    figure.savefig(file, bbox_inches="tight")
 
 
 def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], controller: PushingController) -> None:
@@ -113,18 +109,18 @@ def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], c
     figure, axes = _figure(3, 1, (8.5, 6.0))
     along_m = table["path_time_s"].clip(upper=controller.path.duration_s) * controller.config.path.speed
     turned = table["state.yaw"] - table["reference_yaw"]
-    axes[0].plot(along_m, 1e3 * table["error_m"], color="tab:orange")
+    axes[0].plot(along_m, 1e3 * table["error_m"], color=ORANGE)
     axes[0].set(ylabel="position error [mm]", ylim=(0.0, None))
-    axes[1].plot(along_m, np.degrees(np.arctan2(np.sin(turned), np.cos(turned))), color="tab:orange")
-    axes[1].axhline(0.0, color="0.6", lw=1)
+    axes[1].plot(along_m, np.degrees(np.arctan2(np.sin(turned), np.cos(turned))), color=ORANGE)
+    axes[1].axhline(0.0, color=GREY, lw=1)
     axes[1].set(ylabel="yaw error [deg]")
-    for ahead_s, colour in zip(AHEAD_S, ("tab:blue", "tab:cyan")):
+    for ahead_s, colour in zip(AHEAD_S, (BLUE, SKY)):
         then = table[["state.x", "state.y"]].shift(-round(ahead_s / controller.config.cycle_s)).to_numpy()
         missed = then - np.array([_predicted(cycle, ahead_s) for cycle in cycles])
         axes[2].plot(along_m, 1e3 * np.hypot(*missed.T), color=colour, label=f"{ahead_s:g} s ahead")
     axes[2].set(ylabel="prediction error [mm]", xlabel="along the path [m]", ylim=(0.0, None))
-    _legend_beside(axes[2])
-    figure.savefig(file, dpi=120)
+    legend_beside(axes[2])
+    figure.savefig(file)
 
 
 def _draw_cycles(file: Path, table: pandas.DataFrame, slider: SliderConfig) -> None:
@@ -133,27 +129,27 @@ def _draw_cycles(file: Path, table: pandas.DataFrame, slider: SliderConfig) -> N
     time_s = table["time_s"] - table["time_s"].iloc[0]
     if "normal" in table:
         edge = 1e3 * slider.friction * table["normal"]
-        axes[0].fill_between(time_s, -edge, edge, color="0.9", label="friction cone")
-        axes[0].plot(time_s, 1e3 * table["tangential"], color="tab:blue", label="tangential force")
-        _legend_beside(axes[0])
-        axes[1].plot(time_s, 1e3 * table["sliding"], color="tab:blue")
+        axes[0].fill_between(time_s, -edge, edge, color=PALE, label="friction cone")
+        axes[0].plot(time_s, 1e3 * table["tangential"], color=BLUE, label="tangential force")
+        legend_beside(axes[0])
+        axes[1].plot(time_s, 1e3 * table["sliding"], color=BLUE)
     axes[0].set(ylabel="force [mm/s]")
     axes[1].set(ylabel="sliding [mm/s]")
-    axes[2].plot(time_s, 1e3 * table["contact"], color="tab:blue")
+    axes[2].plot(time_s, 1e3 * table["contact"], color=BLUE)
     for side in (-1, 1):
-        axes[2].axhline(side * 1e3 * slider.reach, color="0.6", ls="--", lw=1)
+        axes[2].axhline(side * 1e3 * slider.reach, color=GREY, ls="--", lw=1)
     axes[2].set(ylabel="pusher on face [mm]")
-    axes[3].plot(time_s, 1e3 * table["command.pusher_vx"], color=RED, label="x")
-    axes[3].plot(time_s, 1e3 * table["command.pusher_vy"], color=GREEN, label="y")
+    axes[3].plot(time_s, 1e3 * table["command.pusher_vx"], color=X, label="x")
+    axes[3].plot(time_s, 1e3 * table["command.pusher_vy"], color=Y, label="y")
     axes[3].set(ylabel="pusher [mm/s]")
-    _legend_beside(axes[3])
-    axes[4].plot(time_s, table["cost"], color="tab:green")
+    legend_beside(axes[3])
+    axes[4].plot(time_s, table["cost"], color=GREEN)
     axes[4].set(ylabel="cost [-]", ylim=(0.0, None))
-    axes[5].plot(time_s, 1e3 * table["wall_s"], color="0.7", label="wall clock")
-    axes[5].plot(time_s, 1e3 * table["processor_s"], color="tab:red", label="processor")
+    axes[5].plot(time_s, 1e3 * table["wall_s"], color=GREY, label="wall clock")
+    axes[5].plot(time_s, 1e3 * table["processor_s"], color=ORANGE, label="processor")
     axes[5].set(ylabel="solver [ms]", xlabel="time [s]", ylim=(0.0, None))
-    _legend_beside(axes[5])
-    figure.savefig(file, dpi=120)
+    legend_beside(axes[5])
+    figure.savefig(file)
 
 
 def _outline(pose: np.ndarray, slider: SliderConfig) -> np.ndarray:
