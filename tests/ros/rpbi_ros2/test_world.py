@@ -1,13 +1,15 @@
-"""A simulated robot that ROS 2 reads, commands and asks."""
+"""A simulated robot that ROS 2 reads, commands and asks. All tests share the simulator and the bridge."""
 
 from __future__ import annotations
 
 import math
+import subprocess
 
 import pytest
 from node_world import main_config
 from ros2_system import COMPANION, Ros2, built
-from ros_system import SUPPORT, wait_until
+from ros_system import SUPPORT, RosSystem, wait_until
+from std_srvs.srv import Trigger
 from trajectory_world import CONTROLLER, HOME, JOINTS, START
 from worlds import iiwa
 
@@ -18,17 +20,23 @@ BOX += "createCollisionShape: {shapeType: GEOM_BOX, halfExtents: [0.1, 0.1, 0.1]
 BOX += "basePosition: [0.8, 0.8, 1.0]\nbroadcast_hz: 50\n"
 
 
-@pytest.fixture
-def arm(ros, tmp_path):
-    """A world with an iiwa, on simulated time."""
+@pytest.fixture(scope="module")
+def world(module_ros: RosSystem, bridge: subprocess.Popen[bytes]) -> RosSystem:
+    """A world with an iiwa, on simulated time, and the bridge."""
     robot = iiwa(joint_trajectory_controller={}, joint_state_publisher_hz=100, **HOME)
-    return ros.simulator(main_config(tmp_path, robots=(robot,)), use_sim_time=True)
+    module_ros.simulator(main_config(module_ros.folder, robots=(robot,)), use_sim_time=True)
+    return module_ros
+
+
+@pytest.fixture
+def arm(world: RosSystem) -> None:
+    """The arm of the world, at its start."""
+    world.call("/rpbi/reset", Trigger)
+    world.call("/rpbi/start", Trigger)
 
 
 @pytest.mark.quick
-def test_target_moves_the_arm_and_clock_drives_time(arm, ros2):
-    ros2.bridge()
-    peer = ros2.peer()
+def test_target_moves_the_arm_and_clock_drives_time(arm, peer):
     peer.use_sim_time(True)
     peer.listen("/rpbi/iiwa/joint_states", STATE)
     target = "/rpbi/iiwa/joint_states/target"
@@ -44,12 +52,11 @@ def test_target_moves_the_arm_and_clock_drives_time(arm, ros2):
     state = peer.last("/rpbi/iiwa/joint_states")["header"]["stamp"]
     now_s = peer.now()
     assert abs(now_s - state["sec"] - state["nanosec"] * 1e-9) < 60.0, "the world's time, not that of the computer"
+    peer.use_sim_time(False)
 
 
-def test_companion_offers_services_by_names_of_the_simulator(arm, ros2):
-    ros2.bridge()
+def test_companion_offers_services_by_names_of_the_simulator(arm, ros, ros2, peer):
     companion = ros2.start(str(COMPANION))
-    peer = ros2.peer()
     parameters = "rcl_interfaces/srv/SetParameters"
 
     def trigger(name: str) -> tuple[bool, str]:
@@ -72,14 +79,12 @@ def test_companion_offers_services_by_names_of_the_simulator(arm, ros2):
     is_done, message = trigger("remove")
     assert not is_done and "box" in message
     assert trigger("start")[0]
-    assert "simulation_interfaces is not installed" in ros2._ros.output(companion)
+    assert "simulation_interfaces is not installed" in ros.output(companion)
 
 
 @pytest.mark.thorough
 def test_trajectory_by_the_action_ends_at_its_goal(arm, ros, domain):
-    prefix = built(SUPPORT / "ros2/control_msgs")
-    ros2 = Ros2(ros, domain, prefix)
-    ros2.bridge()
+    ros2 = Ros2(ros, domain, built(SUPPORT / "ros2/control_msgs"))
     ros2.start(str(COMPANION))
     peer = ros2.peer()
     goal = [0.4, 0.2, -0.3, -0.9, 0.3, -0.4, 0.5]
@@ -106,18 +111,8 @@ def test_trajectory_by_the_action_ends_at_its_goal(arm, ros, domain):
 
 
 @pytest.mark.thorough
-def test_launch_file_of_an_example_starts_the_bridge(ros, ros2):
-    command = ["roslaunch", "rpbi_examples", "run_kuka.launch", "headless:=true", "ros2:=true"]
-    ros.start(command, ROS_DOMAIN_ID=str(ros2.domain))
-    peer = ros2.peer()
-    peer.listen("/rpbi/kuka_lwr/joint_states", STATE)
-    wait_until(lambda: peer.count("/rpbi/kuka_lwr/joint_states"), "the robot is seen")
-
-
-@pytest.mark.thorough
 def test_companion_offers_the_standard_services_of_simulators(arm, ros, domain):
     ros2 = Ros2(ros, domain, built(SUPPORT / "ros2/simulation_interfaces"))
-    ros2.bridge()
     ros2.start(str(COMPANION))
     peer = ros2.peer()
 

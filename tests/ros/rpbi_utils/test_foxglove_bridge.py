@@ -10,15 +10,16 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import genpy.dynamic
 import pytest
 import rosgraph
 import rospy
+from foxglove_bridge import FoxgloveBridge, publications, start_node, subscriptions
 from foxglove_client import FoxgloveClient, StalledViewer, lost
-from node_world import Rosout, main_config, resident_mb
-from ros_system import RosSystem, support_on_path, wait_until
+from node_world import main_config, resident_mb
+from ros_system import support_on_path, wait_until
 from std_msgs.msg import Int32, String, UInt8MultiArray
 from websockets.exceptions import ConnectionClosed
 from workplace import Port
@@ -26,36 +27,15 @@ from worlds import iiwa
 
 from ros_pybullet_interface.msg import SimulationState
 
-NODE = "/foxglove"
 STATES = "/rpbi/arm/joint_states"
 
 
-class Bridge(NamedTuple):
-    """A small world and the bridge."""
-
-    ros: RosSystem
-    port: int
-    process: Any
-    rosout: Rosout
-
-
 @pytest.fixture(scope="module")
-def bridge(module_ros) -> Iterator[Bridge]:
-    port = Port()
-    rosout = Rosout(module_ros)
+def bridge(module_ros) -> FoxgloveBridge:
+    """The bridge next to a world with an arm."""
     arm = iiwa("arm", joint_state_publisher_hz=1000)
     module_ros.simulator(main_config(module_ros.folder, robots=(arm,), setAdditionalSearchPath="pybullet_data_path"))
-    process = start(module_ros, port.number)
-    rosout.wait_to_hear(NODE)
-    yield Bridge(module_ros, port.number, process, rosout)
-
-
-def start(ros: RosSystem, port: int, *arguments: str, wait: bool = True, **environment: str) -> Any:
-    command = ["rosrun", "rpbi_utils", "foxglove_node.py", "--port", str(port), *arguments]
-    process = ros.start(command, fresh=bool(environment), **environment)
-    if wait:
-        wait_until(lambda: "can connect to" in ros.output(process), "the bridge is up")
-    return process
+    return FoxgloveBridge(module_ros)
 
 
 @pytest.fixture
@@ -76,13 +56,7 @@ def unharmed(bridge, topic) -> Iterator[None]:
     with FoxgloveClient(bridge.port) as viewer:
         viewer.subscribe("/told")
         wait_until(lambda: topic.publish("still here") or viewer.messages["/told"], "a viewer is served")
-    assert "Traceback" not in bridge.ros.output(bridge.process), bridge.ros.output(bridge.process)
-
-
-def lines(bridge: Bridge, text: str) -> int:
-    """Waits for a line about something; returns the number of such lines."""
-    bridge.rosout.wait_for([text])
-    return len(bridge.rosout.logs(text))
+    assert "Traceback" not in bridge.output, bridge.output
 
 
 @pytest.mark.parametrize("count", [1000, pytest.param(60_000, marks=pytest.mark.thorough)])
@@ -123,7 +97,7 @@ def test_messages_that_do_not_fit_their_type_are_left_out(bridge, unharmed):
             viewer.publish(channel, data)
         wait_until(lambda: viewer.publish(channel, b"\x01\x00\x00\x00") or heard.messages, "the right one comes")
         assert {each.data for each in heard.messages} == {1}
-    assert lines(bridge, "/heard: message left out: it is no std_msgs/Int32") == 1
+    assert bridge.lines("/heard: message left out: it is no std_msgs/Int32") == 1
     heard.close()
 
 
@@ -144,7 +118,7 @@ def test_wrong_announcements_are_refused_in_one_line(bridge, topic_name, type_na
     with FoxgloveClient(bridge.port) as viewer:
         channel = viewer.advertise(topic_name, type_name, encoding)
         viewer.publish(channel, b"{}")
-        assert lines(bridge, told) == 1
+        assert bridge.lines(told) == 1
     (log,) = bridge.rosout.logs(told)
     assert len(log.msg) < 300 and "\n" not in log.msg
     assert before == set(rosgraph.Master("/tests").getTopicTypes()[0])
@@ -179,6 +153,7 @@ def test_garbage_does_not_harm(bridge, unharmed):
         connection.sendall(b"GET / HTTP/1.1\r\n\r\n" + b"\0" * 10_000)
 
 
+@pytest.mark.thorough
 def test_message_of_100_megabytes_is_refused(bridge, unharmed):
     heard = bridge.ros.listen("/large", UInt8MultiArray)
     with FoxgloveClient(bridge.port) as viewer:
@@ -191,6 +166,7 @@ def test_message_of_100_megabytes_is_refused(bridge, unharmed):
     heard.close()
 
 
+@pytest.mark.thorough
 def test_million_subscriptions_do_not_harm(bridge, unharmed):
     before_mb = resident_mb(bridge.process.pid)
     with FoxgloveClient(bridge.port) as viewer:
@@ -206,26 +182,34 @@ def test_million_subscriptions_do_not_harm(bridge, unharmed):
     assert resident_mb(bridge.process.pid) < before_mb + 300
 
 
+@pytest.mark.thorough
 def test_viewer_that_announces_many_topics_is_limited(bridge, unharmed):
     with FoxgloveClient(bridge.port) as viewer:
         for number in range(300):
             viewer.advertise(f"/many/{number}", "std_msgs/Int32")
-        assert lines(bridge, "viewers have more than 100 topics") >= 1
-        published = [name for name, nodes in rosgraph.Master("/tests").getSystemState()[0] if NODE in nodes]
-        assert sum(name.startswith("/many") for name in published) <= 100
+        assert bridge.lines("viewers have more than 100 topics") >= 1
+        assert sum(name.startswith("/many") for name in publications()) <= 100
         viewer.op("unadvertise", channelIds=list(range(1000)))
 
 
 def test_flood_of_messages_is_limited(bridge, unharmed, topic):
     heard = bridge.ros.listen("/flooded", Int32)
+    sent = 0
     with FoxgloveClient(bridge.port) as flooder, FoxgloveClient(bridge.port) as viewer:
         viewer.subscribe("/told")
         channel = flooder.advertise("/flooded", "std_msgs/Int32")
-        for _ in range(20_000):
-            flooder.publish(channel, b"\x01\x00\x00\x00")
+
+        def is_limited() -> list[Any]:
+            """Floods; a busy computer may be too slow for it at first."""
+            nonlocal sent
+            for _ in range(10_000):
+                flooder.publish(channel, b"\x01\x00\x00\x00")
+            sent += 10_000
+            return bridge.rosout.logs("messages left out: more than 2000 in a second")
+
+        wait_until(is_limited, "messages are left out")
         wait_until(lambda: topic.publish("x") or viewer.messages["/told"], "another viewer is served")
-    assert lines(bridge, "messages left out: more than 2000 in a second") >= 1
-    assert 0 < len(heard.messages) < 20_000
+    assert 0 < len(heard.messages) < sent
     heard.close()
 
 
@@ -236,13 +220,15 @@ def test_slow_viewer_loses_only_its_own(bridge, unharmed):
         wait_until(
             lambda: publisher.publish(UInt8MultiArray()) or viewer.messages["/large_images"], "the bridge listens"
         )
-        before = len(viewer.messages["/large_images"])
         for number in range(40):
             publisher.publish(UInt8MultiArray(data=bytes([number]) * 1_000_000))
             time.sleep(0.01)
-        wait_until(lambda: len(viewer.messages["/large_images"]) >= before + 40, "the other viewer has all")
-        taken = [data[-1] for _, data in viewer.messages["/large_images"] if len(data) > 1_000_000]
-    assert taken == list(range(40))
+
+        def taken() -> list[int]:
+            return [data[-1] for _, data in list(viewer.messages["/large_images"]) if len(data) > 1_000_000]
+
+        wait_until(lambda: len(taken()) >= 40, "the other viewer has all")
+    assert taken() == list(range(40))
     publisher.unregister()
 
 
@@ -257,13 +243,13 @@ def test_memory_for_a_viewer_that_takes_nothing_is_limited(bridge, unharmed):
                 publisher.publish(UInt8MultiArray(data=bytes(1_000_000)))
                 time.sleep(0.02)
             assert 100 < resident_mb(bridge.process.pid) - before_mb < 350
-        wait_until(lambda: NODE not in subscribers_of("/large_images"), "it is not served any more")
+        wait_until(lambda: "/large_images" not in subscriptions(), "it is not served any more")
         wait_until(lambda: resident_mb(bridge.process.pid) < before_mb + 60, "its messages are freed")
     publisher.unregister()
 
 
 @contextmanager
-def stalled_viewer(bridge: Bridge, viewer: FoxgloveClient, name: str) -> Iterator[None]:
+def stalled_viewer(bridge: FoxgloveBridge, viewer: FoxgloveClient, name: str) -> Iterator[None]:
     wait_until(lambda: name in viewer.channels, f"{name} is offered")
     stalled = StalledViewer(bridge.port, viewer.channels[name]["id"])
     yield
@@ -300,17 +286,13 @@ def test_viewers_that_come_and_leave_do_not_block_the_bridge(bridge, unharmed):
     rospy.delete_param("/a")
 
 
-def subscribers_of(name: str) -> list[str]:
-    return dict(rosgraph.Master("/tests").getSystemState()[1]).get(name, [])
-
-
 def test_topic_of_a_type_that_is_not_installed_is_shown(bridge):
     (message_class,) = genpy.dynamic.generate_dynamic("lab_msgs/Reading", "float64 value\nstring unit\n").values()
     publisher = rospy.Publisher("/reading", message_class, queue_size=10)
     with FoxgloveClient(bridge.port) as viewer:
         wait_until(lambda: "/reading" in viewer.channels, "it is offered")
         assert viewer.channels["/reading"]["schema"].startswith("float64 value\nstring unit\n")
-        assert NODE not in dict(rosgraph.Master("/tests").getSystemState()[1]).get("/reading", [])
+        assert "/reading" not in subscriptions()
         viewer.subscribe("/reading")
         message = message_class(1.5, "m")
         wait_until(lambda: publisher.publish(message) or viewer.messages["/reading"], "it comes")
@@ -334,7 +316,7 @@ def test_definition_of_the_publisher_replaces_an_installed_one(bridge):
 def test_topic_whose_publisher_has_died_is_named_in_one_line(bridge):
     master = rosgraph.Master("/dead")
     master.registerPublisher("/orphan<b>", "lab_msgs/Unknown", "http://127.0.0.1:1")
-    assert lines(bridge, "/orphan<b>: not shown: its type lab_msgs/Unknown is not installed") == 1
+    assert bridge.lines("/orphan<b>: not shown: its type lab_msgs/Unknown is not installed") == 1
     master.unregisterPublisher("/orphan<b>", "http://127.0.0.1:1")
 
 
@@ -347,15 +329,17 @@ def test_names_with_html_are_passed_on_as_text(bridge):
 
 
 def test_second_bridge_on_the_port_ends_in_one_line(bridge):
-    second = start(bridge.ros, bridge.port, wait=False)
+    second = start_node(bridge.ros, bridge.port)
     assert second.wait(60.0) == 1
     said = bridge.ros.output(second)
     assert len(said.splitlines()) == 1 and f"port {bridge.port} of 127.0.0.1 is in use" in said
 
 
+@pytest.mark.thorough
 def test_second_bridge_on_another_port_serves_too(bridge, topic):
     port = Port()
-    second = start(bridge.ros, port.number, "__name:=second_bridge")
+    second = start_node(bridge.ros, port.number, "__name:=second_bridge")
+    wait_until(lambda: "can connect to" in bridge.ros.output(second), "the second bridge is up")
     with FoxgloveClient(port.number) as viewer:
         viewer.subscribe("/told")
         wait_until(lambda: topic.publish("x") or viewer.messages["/told"], "it serves")
@@ -365,21 +349,26 @@ def test_second_bridge_on_another_port_serves_too(bridge, topic):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--host", "no.such.host.invalid"], "cannot listen at no.such.host.invalid"),
+        pytest.param(
+            ["--host", "no.such.host.invalid"],
+            "cannot listen at no.such.host.invalid",
+            marks=pytest.mark.thorough,
+        ),
         (["--host", "192.0.2.1"], "cannot listen at 192.0.2.1"),
     ],
 )
 def test_wrong_address_ends_in_one_line(bridge, arguments, told):
-    wrong = start(bridge.ros, Port().number, *arguments, wait=False)
+    wrong = start_node(bridge.ros, Port().number, *arguments)
     assert wrong.wait(60.0) == 1
     said = bridge.ros.output(wrong)
     assert len(said.splitlines()) == 1 and told in said
 
 
+@pytest.mark.thorough
 def test_missing_extra_is_named_in_one_line(bridge, tmp_path):
     (tmp_path / "foxglove.py").write_text("raise ImportError\n")
     modules = f"{tmp_path}:{support_on_path()['PYTHONPATH']}"
-    node = start(bridge.ros, Port().number, wait=False, PYTHONPATH=modules)
+    node = start_node(bridge.ros, Port().number, PYTHONPATH=modules)
     assert node.wait(60.0) == 1
     assert bridge.ros.output(node).splitlines() == ["foxglove: 'foxglove-sdk' is not installed: ./rpbi setup foxglove"]
 

@@ -236,7 +236,7 @@ def test_two_viewers_see_the_same(viewer: Viewer, link: str) -> None:
         viewer.wait(lambda: "/frames" not in viewer.nodes)
 
 
-def test_restarted_simulator_is_shown(ros: RosSystem) -> None:
+def test_restarted_simulator_is_shown_with_deforming_soft_bodies(ros: RosSystem, tmp_path: Path) -> None:
     simulator = ros.simulator(box_world(ros), namespace="/again/")
     _, link = start_view(ros, "__ns:=/again")
     with Viewer(link) as viewer:
@@ -244,29 +244,22 @@ def test_restarted_simulator_is_shown(ros: RosSystem) -> None:
         os.killpg(simulator.pid, signal.SIGINT)
         simulator.wait(60.0)
         viewer.wait(lambda: viewer.value("World") == "no simulator" and not has(viewer, "/box/"))
-        world = {**box_world(ros), "robots": [ros.write_yaml("arm.yaml", iiwa())]}
-        ros.simulator(world, namespace="/again/")
-        viewer.wait(lambda: has(viewer, "/box/") and has(viewer, "/iiwa/"))
-
-
-def test_soft_body_deforms_in_the_view(ros: RosSystem, tmp_path: Path) -> None:
-    soft = {"soft_objects": [ros.write_yaml("soft.yaml", block(tmp_path))], **DEFORMABLE}
-    ros.simulator({**box_world(ros), **soft}, namespace="/soft/")
-    _, link = start_view(ros, "__ns:=/soft")
-    with Viewer(link) as viewer:
-        viewer.wait(lambda: has(viewer, "/jelly/"))
+        soft = {"soft_objects": [ros.write_yaml("soft.yaml", block(tmp_path))], **DEFORMABLE}
+        ros.simulator({**box_world(ros), **soft}, namespace="/again/")
+        viewer.wait(lambda: has(viewer, "/box/") and has(viewer, "/jelly/"))
         updates = viewer.counts.get("SceneNodeUpdateMessage", 0)
         viewer.wait(lambda: viewer.counts.get("SceneNodeUpdateMessage", 0) > updates + 3)
         assert viewer.counts["MeshMessage"] < 20
 
 
-def test_view_on_another_address_has_a_token(ros: RosSystem) -> None:
-    node, link = start_view(ros, "_host:=127.0.0.2", "__ns:=/guarded")
+def test_view_on_another_address_has_a_token(world: RosSystem, ros: RosSystem) -> None:
+    node, link = start_view(ros, "_host:=127.0.0.2", "__name:=guarded")
     assert re.fullmatch(r"http://127\.0\.0\.2:\d+/\?token=[\w-]{20,}", link)
     os.killpg(node.pid, signal.SIGINT)
     assert node.wait(60.0) == 0 and "Traceback" not in ros.output(node)
 
 
+@pytest.mark.thorough
 def test_port_in_use_ends_the_node_with_one_line(ros: RosSystem, link: str) -> None:
     port = link.rstrip("/").rpartition(":")[2]
     node = ros.start(["rosrun", "rpbi_data", "browser_view_node.py", "__name:=second", f"_port:={port}"])
@@ -274,6 +267,7 @@ def test_port_in_use_ends_the_node_with_one_line(ros: RosSystem, link: str) -> N
     assert f"port {port}: Address already in use" in ros.output(node) and "Traceback" not in ros.output(node)
 
 
+@pytest.mark.thorough
 def test_command_shows_the_running_world_until_it_is_interrupted(world: RosSystem) -> None:
     command = world.start([RPBI, "view", "--port", "0"])
     wait_until(lambda: "view: http" in world.output(command) or command.poll() is not None, "the link is printed")
@@ -285,6 +279,7 @@ def test_command_shows_the_running_world_until_it_is_interrupted(world: RosSyste
         assert command.wait(60.0) == 0 and "Traceback" not in world.output(command)
 
 
+@pytest.mark.thorough
 def test_hanging_simulator_does_not_stop_the_view(ros: RosSystem) -> None:
     simulator = ros.simulator(box_world(ros), namespace="/hangs/")
     _, link = start_view(ros, "__ns:=/hangs")
