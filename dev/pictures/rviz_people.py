@@ -184,7 +184,7 @@ def tracking(path: Path) -> None:
         stage.launch("tracking_example.launch")
         frames = Frames("lab/rpbi/world")
         boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
-        view = Orbit(1.2, (0.0, 0.6, 0.2), 0.7, 0.3)
+        view = Orbit(1.25, (0.0, 0.6, 0.2), 0.75, 0.0)
         stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
 
         def apart() -> float:
