@@ -28,6 +28,8 @@ WIPING_SEED = 212
 TARGET_HZ = 50.0
 FRICTION = 0.7
 """Friction coefficient of box and floor."""
+PACE = 0.3
+"""Real-time factor of learning from demonstration, so that no target is late on a busy machine."""
 SHOWN_S = 11.0
 """Duration of the demo in the picture, in which the arm pushes twice [s]."""
 
@@ -59,7 +61,7 @@ def draw_forces(path: Path) -> None:
 def draw_press(path: Path) -> None:
     """Draws the figure that the example `human_interaction` writes after the press of the scripted hand."""
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
-        arguments = ("device:=scripted", "headless:=true", f"output:={folder}")
+        arguments = ("device:=scripted", "headless:=true", "guard:=false", f"output:={folder}")
         stage.launch("human_interaction.launch", *arguments).wait(PATIENCE_S)
         shutil.copyfile(Path(folder) / "human_interaction.png", path)
     give_palette(path)
@@ -68,7 +70,7 @@ def draw_press(path: Path) -> None:
 def draw_lfd_pipeline(path: Path) -> None:
     """Draws the stages of a scripted run of the example `lfd`."""
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
-        arguments = ("operator:=scripted", "seed:=3", "headless:=true", f"out:={folder}")
+        arguments = ("operator:=scripted", "seed:=3", "headless:=true", f"out:={folder}", f"real_time_factor:={PACE}")
         stage.launch("lfd.launch", *arguments).wait(PATIENCE_S)
         shutil.copyfile(Path(folder) / "pipeline.png", path)
     give_palette(path)

@@ -113,7 +113,7 @@ def teleop(path: Path) -> None:
 def human_interaction(path: Path) -> None:
     """Draws the arm that presses on the box, and the window of the virtual device with its force."""
     with Stage(760, 600) as stage, tempfile.TemporaryDirectory() as folder:
-        stage.launch("human_interaction.launch", "plot:=false", f"output:={folder}")
+        stage.launch("human_interaction.launch", "plot:=false", "guard:=false", f"output:={folder}")
         force = Newest("haptics/force", WrenchStamped)
         handle = place("^Virtual haptic device$")
         wait_until(lambda: force.message, "the device runs")
@@ -171,7 +171,7 @@ def mvn(path: Path) -> None:
     """Draws two people of the emulator, with the frames of their segments."""
     with Stage(900, 640) as stage:
         stage.launch("mvn.launch", "people:=2", "arm_held_out:=true")
-        view = Orbit(3.3, (0.0, 0.45, 0.85), 0.3, 0.5)
+        view = Orbit(3.1, (0.0, -0.3, 0.85), 0.3, 0.5)
         stage.rviz(RVIZ / "mvn.rviz", {"TF": {"Marker Scale": 0.35}}, **view.properties)
         time.sleep(RESTS_S)
         picture = stage.picture()
@@ -184,7 +184,7 @@ def tracking(path: Path) -> None:
         stage.launch("tracking_example.launch")
         frames = Frames("lab/rpbi/world")
         boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
-        view = Orbit(1.2, (0.0, 0.6, 0.2), 0.7, 0.3)
+        view = Orbit(1.25, (0.0, 0.6, 0.2), 0.75, 0.0)
         stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
 
         def apart() -> float:
@@ -212,10 +212,17 @@ def tracking(path: Path) -> None:
             carry(True)
             return with_caption(beside(*parts, gap_px=2), caption)
 
+        def is_in_the_middle() -> bool:
+            return bool(abs(frames.wait_for(boxes["lab"])[1]) < 0.1)
+
         def is_on_floor() -> bool:
             return bool(frames.wait_for(boxes["twin"])[2] < 0.05 + TWIN[2] + 0.005)
 
-        seen = moment(lambda: apart() < 0.02, "Vicon sees the box", "The box is seen: both boxes are at the same place")
+        seen = moment(
+            lambda: apart() < 0.02 and is_in_the_middle(),
+            "Vicon sees the box",
+            "The box is seen: both boxes are at the same place",
+        )
         hidden = moment(is_on_floor, "the box of the twin falls", "The box is hidden: the box of the twin has fallen")
     write_png(path, beside(seen, hidden))
 

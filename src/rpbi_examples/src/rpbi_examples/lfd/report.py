@@ -183,7 +183,7 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
     _map(planned, goal, "5  plan from a random start")
     _draw_run(execution, goal, executed, f"6  executed: box {executed.error}", with_plan=False)
     for axes in grid.flat:
-        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(-0.05, -0.16), ncols=3)
     figure.get_layout_engine().set(w_pad=0.25, h_pad=0.12)
     figure.draw_without_rendering()
     for begin, end in ((signal, where), (where, states), (states, learned), (learned, planned), (planned, execution)):
