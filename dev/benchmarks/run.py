@@ -26,8 +26,10 @@ BENCHMARKS = (
 )
 WHEN_NAMED = (
     *(
+        "browser",
         "controls",
         "datasets",
+        "doors",
         "dressing",
         "examples",
         "farm",

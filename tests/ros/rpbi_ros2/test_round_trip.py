@@ -1,20 +1,22 @@
-"""Messages that go from ROS 1 through rclpy back to ROS 1, the tree of TF, and own messages as packages of ROS 2."""
+"""Messages that go from ROS 1 through rclpy back to ROS 1, and the tree of TF of made-up frames and of the demo."""
 
 from __future__ import annotations
 
 import random
+from collections import defaultdict
 from io import BytesIO
+from typing import Any
 
+import genpy
 import pytest
-import rospy
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from random_messages import converted_classes, random_message, without_seq
 from ros2_system import Ros2, built, connect
 from ros_system import SUPPORT, wait_until
 from tf2_msgs.msg import TFMessage
 
+from rpbi_ros2.layouts import OWN_PACKAGES
 from rpbi_ros2.message_packages_node import write_package
-from safe_robot.msg import Status
 
 pytestmark = pytest.mark.thorough
 WHEELS = ("actionlib_msgs", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs",
@@ -28,9 +30,10 @@ def raw_of(message) -> bytes:
     return buffer.getvalue()
 
 
-@pytest.mark.parametrize("package", WHEELS)
-def test_messages_return_equal_through_rclpy(ros, ros2, publisher, package):
+def check_round_trip(ros, ros2, publisher, package: str) -> None:
+    """Sends random messages of all types of a package through rclpy, and compares those that come back."""
     kinds = {message_class.__name__: message_class for message_class, _ in converted_classes(package)}
+    assert kinds
     senders = {name: publisher(f"/there/{name}", each) for name, each in kinds.items()}
     back = {name: ros.listen(f"/back/{name}", each) for name, each in kinds.items()}
     ros2.bridge()
@@ -54,6 +57,18 @@ def test_messages_return_equal_through_rclpy(ros, ros2, publisher, package):
             return [without_seq(each) for each in back[name].messages][-len(expected) :] == expected
 
         wait_until(has_all, f"all of {name} are back and equal", 20.0)
+
+
+@pytest.mark.parametrize("package", WHEELS)
+def test_messages_return_equal_through_rclpy(ros, ros2, publisher, package):
+    check_round_trip(ros, ros2, publisher, package)
+
+
+@pytest.mark.parametrize("package", sorted(OWN_PACKAGES - {"control_msgs"}))
+def test_own_messages_return_equal_through_packages_that_ros2_builds(ros, domain, tmp_path, publisher, package):
+    written = write_package(package, tmp_path)
+    assert written == sorted(message_class.__name__ for message_class, _ in converted_classes(package))
+    check_round_trip(ros, Ros2(ros, domain, built(tmp_path / package)), publisher, package)
 
 
 def transform(parent: str, child: str, generator: random.Random) -> TransformStamped:
@@ -95,16 +110,67 @@ def test_tree_of_tf_is_that_of_ros1(ros, domain, publisher):
             assert [each["transform"][part][axis] for axis in axes] == values
 
 
-def test_own_messages_are_read_by_a_package_that_ros2_builds(ros, domain, tmp_path, publisher):
-    assert write_package("safe_robot", tmp_path) == ["Status", "Violation"]
-    ros2 = Ros2(ros, domain, built(tmp_path / "safe_robot"))
-    out = publisher("/safe_robot/status", Status)
-    ros2.bridge()
+Tree = dict[str, dict[int, tuple[str, list[float]]]]
+"""Parent, position [m] and quaternion x, y, z, w of frames, by name and stamp [ns]."""
+
+
+def tree_of(messages: list[Any]) -> Tree:
+    """Returns the transforms of messages of ROS 1, or of those of ROS 2 as dictionaries."""
+    tree: Tree = defaultdict(dict)
+    for message in messages:
+        for each in message["transforms"] if isinstance(message, dict) else plain(message)["transforms"]:
+            stamp, pose = each["header"]["stamp"], each["transform"]
+            stamp_ns = stamp["sec"] * 1_000_000_000 + stamp["nanosec"]
+            values = [*pose["translation"].values(), *pose["rotation"].values()]
+            tree[each["child_frame_id"]][stamp_ns] = each["header"]["frame_id"], values
+    return tree
+
+
+def plain(message: Any) -> Any:
+    """Returns a message of ROS 1 as dictionaries, as those of ROS 2 come."""
+    if isinstance(message, genpy.Message):
+        return {name: plain(getattr(message, name)) for name in message.__slots__}
+    if isinstance(message, genpy.Time):
+        return {"sec": message.secs, "nanosec": message.nsecs}
+    return [plain(each) for each in message] if isinstance(message, list) else message
+
+
+def differences(here: Tree, there: Tree) -> set[str]:
+    """Returns the frames without a common stamp, or with another parent or pose at one."""
+    different = here.keys() ^ there.keys()
+    for name in here.keys() & there.keys():
+        common = here[name].keys() & there[name].keys()
+        pairs = [(here[name][stamp], there[name][stamp]) for stamp in common]
+        if not pairs or any(a[0] != b[0] or a[1] != pytest.approx(b[1], rel=0.0, abs=1e-9) for a, b in pairs):
+            different.add(name)
+    return different
+
+
+def test_tree_of_the_running_demo_is_that_of_ros1(ros, domain):
+    ros2 = Ros2(ros, domain, built(SUPPORT / "ros2/tf2_msgs", SUPPORT / "ros2/control_msgs"))
+    launch = ["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", "headless:=true", "ros2:=true"]
+    ros.start(launch, ROS_DOMAIN_ID=str(domain))
+    moving, fixed = ros.listen("/tf", TFMessage), ros.listen("/tf_static", TFMessage)
     peer = ros2.peer()
-    peer.listen("/safe_robot/status", "safe_robot/msg/Status")
-    message = random_message(Status, random.Random(3))
-    message.header.stamp = rospy.Time(12, 34)
-    connect(peer, "/safe_robot/status", out, message)
-    received = peer.last("/safe_robot/status")
-    assert received["message"] == message.message and received["is_safe"] == message.is_safe
-    assert received["header"]["stamp"] == {"sec": 12, "nanosec": 34}
+    peer.listen("/tf", TF, depth=1000)
+    peer.listen("/tf_static", TF, depth=100, keeps=True)
+    trees: dict[str, Tree] = {}
+
+    def are_equal() -> bool:
+        trees["here"] = tree_of([*moving.messages, *fixed.messages])
+        trees["there"] = tree_of([*peer.messages("/tf"), *peer.messages("/tf_static")])
+        return len(moving.messages) > 200 and not differences(trees["here"], trees["there"])
+
+    try:
+        wait_until(are_equal, "all frames are equal", every_s=2.0)
+    except TimeoutError:
+        assert differences(trees["here"], trees["there"]) == set()
+        raise
+    here = trees["here"]
+    assert len(here) > 10 and {"rpbi/box", "rpbi/kuka_lwr/lwr_arm_7_link", "rpbi/camera"} <= here.keys()
+    assert sum(len(here[name].keys() & trees["there"][name].keys()) for name in here) > 1000
+    name = "rpbi/kuka_lwr/lwr_arm_7_link"
+    stamp = max(here[name].keys() & trees["there"][name].keys())
+    parent, values = here[name][stamp]
+    here[name][stamp] = parent, [values[0] + 1e-8, *values[1:]]
+    assert differences(here, trees["there"]) == {name}, "negative control"

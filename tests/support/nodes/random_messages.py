@@ -23,6 +23,7 @@ RANGES = {
 }  # fmt: skip
 FLOATS = (0.0, -0.0, 1.0, float("inf"), float("-inf"), 5e-324, 1.7976931348623157e308)
 LENGTHS = (0, 0, 1, 2, 3, 7, 40)
+ACTION_PARTS = ("Action", "ActionGoal", "ActionResult", "ActionFeedback", "Goal", "Result", "Feedback")
 TEXTS = ("", "a", "rpbi/world", "\u00e4\u6f22\U0001f916", "with\nlines", "x" * 300)
 
 
@@ -30,8 +31,9 @@ def message_classes(package: str) -> list[Any]:
     """Returns the classes of all messages of a package, without those of its actions."""
     module = import_module(f"{package}.msg")
     found = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, genpy.Message)]
-    parts = ("Action", "ActionGoal", "ActionResult", "ActionFeedback", "Goal", "Result", "Feedback")
-    return [each for each in found if not (each.__name__.endswith(parts) and each.__name__ not in ("JointGoal",))]
+    actions = [each.__name__.removesuffix("Action") for each in found if each.__name__.endswith("Action")]
+    parts = {f"{action}{part}" for action in actions for part in ACTION_PARTS}
+    return [each for each in found if each.__name__ not in parts]
 
 
 def converted_classes(package: str) -> Iterator[tuple[Any, Ros2Type]]:

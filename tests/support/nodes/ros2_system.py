@@ -107,6 +107,23 @@ def built(*packages: Path) -> Path:
     return prefix
 
 
+def ros2_environment(domain: int, *prefixes: Path) -> dict[str, str]:
+    """Returns the variables of programs with ROS 2 that meet in a domain on the loopback interface.
+
+    Args:
+        domain: The domain.
+        prefixes: Folders of installed packages, that of ROS 2 itself last.
+    """
+    return {
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+        "PYTHONPATH": os.pathsep.join(f"{prefix}/lib/python3.12/site-packages" for prefix in prefixes),
+        "LD_LIBRARY_PATH": os.pathsep.join(f"{prefix}/lib" for prefix in prefixes),
+        "AMENT_PREFIX_PATH": os.pathsep.join(map(str, prefixes)),
+    }
+
+
 class Ros2:
     """ROS 2 in one domain, on the loopback interface.
 
@@ -118,14 +135,7 @@ class Ros2:
 
     def __init__(self, ros: RosSystem, domain: int, *prefixes: Path) -> None:
         self.folder, self.domain, self._ros, self._numbers = ros2_folder(), domain, ros, count()
-        self.environment = {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
-            "PYTHONPATH": os.pathsep.join(f"{prefix}/lib/python3.12/site-packages" for prefix in prefixes),
-            "LD_LIBRARY_PATH": os.pathsep.join(f"{prefix}/lib" for prefix in prefixes),
-            "AMENT_PREFIX_PATH": os.pathsep.join(map(str, (*prefixes, self.folder))),
-        }
+        self.environment = ros2_environment(domain, *prefixes, self.folder)
 
     def start(self, *command: str) -> subprocess.Popen[bytes]:
         """Starts a Python program with ROS 2."""

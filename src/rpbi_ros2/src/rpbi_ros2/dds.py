@@ -6,7 +6,7 @@ import json
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError, MissingDependency
@@ -186,8 +186,8 @@ class DdsParticipant:
             raise InterfaceError(f"ROS 2 cannot be reached in {where}: {error}") from None
         self._waiting = WaitSet(self._participant)
         self._classes: dict[str, type[Sample]] = {}
-        self._participants = BuiltinDataReader(self._participant, BuiltinTopicDcpsParticipant)
-        self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+        self._participants = _Discovered(BuiltinDataReader(self._participant, BuiltinTopicDcpsParticipant))
+        self._publications = _Discovered(BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication))
 
     def writer(self, name: str, message_type: Ros2Type, keeps_last: bool = False) -> DdsWriter:
         """Opens a writer.
@@ -240,7 +240,7 @@ class DdsParticipant:
         Raises:
             InterfaceError: If there is one.
         """
-        for qos in (each.qos for each in _alive(self._participants)):
+        for qos in (each.qos for each in self._participants.alive):
             other = Bridge.parse(qos[Policy.Userdata].data) if Policy.Userdata in qos else None
             if other is not None and other.prefix == self._bridge.prefix and other < self._bridge:
                 raise InterfaceError(
@@ -251,7 +251,7 @@ class DdsParticipant:
     def topics_of_others(self) -> set[str]:
         """Returns the names in ROS 2 of topics that other programs publish."""
         ours = self._participant.guid
-        others = (each for each in _alive(self._publications) if each.participant_key != ours)
+        others = (each for each in self._publications.alive if each.participant_key != ours)
         return {each.topic_name.removeprefix(PREFIX) for each in others if each.topic_name.startswith(f"{PREFIX}/")}
 
     def _topic(self, name: str, message_type: Ros2Type) -> Topic[Sample]:
@@ -261,10 +261,30 @@ class DdsParticipant:
         self._waiting.detach(reader)
 
 
-def _alive(reader: BuiltinDataReader) -> Iterator[Any]:
-    for sample in reader.read(MAX_ENDPOINTS):
-        if sample.sample_info.valid_data and sample.sample_info.instance_state == InstanceState.Alive:
-            yield sample
+class _Discovered:
+    """Participants or publications in the domain.
+
+    A reading takes milliseconds, in which messages wait for Python's lock: only changes are read.
+
+    Args:
+        reader: Reader of what Cyclone DDS has discovered.
+    """
+
+    def __init__(self, reader: BuiltinDataReader) -> None:
+        self._reader = reader
+        self._alive: list[Any] = []
+
+    @property
+    def alive(self) -> list[Any]:
+        """Those that have not ended."""
+        if self._reader.get_status_changes() & DDSStatus.DataAvailable:  # a reading clears it
+            samples: list[Any] = self._reader.read(MAX_ENDPOINTS)
+            self._alive = [
+                each
+                for each in samples
+                if each.sample_info.valid_data and each.sample_info.instance_state == InstanceState.Alive
+            ]
+        return self._alive
 
 
 def _qos(message_type: Ros2Type, depth: int, *policies: Any) -> Qos:
