@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from robot_model.collision.shapes import Obstacle
 from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
 
-from .collision import CollisionModel, Group
+from .collision import Group
 from .scene import PlanningScene, SceneRobot
-from .timing import Trajectory
+from .timing import PathTiming, Trajectory
 
-Array = np.ndarray
 PERIOD_S = 0.02
 """Time between two commands that are checked [s]."""
-SLOWER = 1.3
+SLOWER = 1.5
 """Factor of the duration when the guard refuses a motion because braking would leave the path."""
-TRIES = 6
+SLOWEST = 12.0
+"""Largest factor of the duration."""
 
 
 def guard_of(scene: PlanningScene, robot: SceneRobot, margin_m: float = 0.0, period_s: float = PERIOD_S) -> Guard:
@@ -49,21 +48,38 @@ def guard_of(scene: PlanningScene, robot: SceneRobot, margin_m: float = 0.0, per
     return Guard(GuardConfig.parse(options, robot.model.urdf_path), robot.model, robot.model.urdf_path)
 
 
-def refusal(scene: PlanningScene, group: Group, trajectory: Trajectory, r: int) -> str:
-    """Returns the reason for which the guard refuses a motion of one robot of a group; empty if it accepts it."""
+class Refusal(NamedTuple):
+    """A command that the guard refuses.
+
+    Attributes:
+        time_s: Time of the command in the motion [s].
+        is_while_braking: Whether not the command, but the braking after it is refused.
+        words: Description.
+    """
+
+    time_s: float
+    is_while_braking: bool
+    words: str
+
+
+def refusal(scene: PlanningScene, group: Group, trajectory: Trajectory, r: int) -> Refusal | None:
+    """Returns the first command of a motion that the guard of one robot of a group refuses; None if there is none."""
     robot = group.robots[r]
-    guard = guard_of(scene, robot)
-    obstacles: tuple[Obstacle, ...] = tuple(
-        obstacle for obstacle in scene.obstacles_for(robot.name)
-        if not _may_touch(scene, robot.name, obstacle.name)
-    )  # fmt: skip
+    key = tuple(each.tobytes() for each in robot.limits)
+    if robot.guard is None or robot.guard[0] != key:
+        robot.guard = key, guard_of(scene, robot)
+    guard = robot.guard[1]
+    obstacles = tuple(each for each in scene.obstacles_for(robot.name) if not _may_touch(scene, robot.name, each.name))
     context = CheckContext(obstacles=obstacles)
+    guard.rest()
     guard.start()
-    for i, q in enumerate(group.full(trajectory.sampled(PERIOD_S), r)):
-        decision = guard.decide(tuple(q.tolist()), context)
-        if decision.violation is not None:
-            return f"{i * PERIOD_S:.2f} s: {decision.violation}"
-    return ""
+    for i, q in enumerate(group.full(trajectory.sampled(PERIOD_S), r).tolist()):
+        measured = {} if i else dict(zip(robot.model.joint_names, q))  # a guard that has been used starts anew
+        violation = guard.decide(tuple(q), context._replace(measured=measured)).violation
+        if violation is not None:
+            time_s = min(i * PERIOD_S, trajectory.duration_s)
+            return Refusal(time_s, violation.is_while_braking, f"{time_s:.2f} s: {violation}")
+    return None
 
 
 def _may_touch(scene: PlanningScene, robot: str, body: str) -> bool:
@@ -71,18 +87,25 @@ def _may_touch(scene: PlanningScene, robot: str, body: str) -> bool:
     return any(body in pair and any(name.split("/")[0] == robot for name in pair) for pair in scene.allowed)
 
 
-def certified(
-    scene: PlanningScene, group: Group, trajectory: Trajectory, model: CollisionModel
-) -> tuple[Trajectory, str]:
-    """Passes a motion through the guard's checks; slows it down where the guard could not brake in time.
+def certified(scene: PlanningScene, group: Group, timing: PathTiming) -> tuple[Trajectory, str]:
+    """Passes a motion through the guard's checks.
+
+    Where braking would leave the path and touch something, the motion stops at the nearest corner. If there is no
+    corner left, the whole motion becomes slower.
 
     Returns:
-        The motion, maybe slower, and the reason for which the guard refuses it; empty if the guard accepts it.
+        The motion, and the reason for which the guard refuses it; empty if the guard accepts it.
     """
-    reason = ""
-    for _ in range(TRIES):
-        reason = next(filter(None, (refusal(scene, group, trajectory, r) for r in range(len(group.robots)))), "")
-        if "while braking" not in reason:
-            break
-        trajectory = trajectory.slower(SLOWER)
-    return trajectory, reason
+    trajectory, factor = timing.trajectory, 1.0
+    while True:
+        found = (refusal(scene, group, trajectory, r) for r in range(len(group.robots)))
+        refused = next((each for each in found if each is not None), None)
+        if refused is None or not refused.is_while_braking:
+            return trajectory, "" if refused is None else refused.words
+        if factor == 1.0 and timing.stop_near(refused.time_s):
+            trajectory = timing.trajectory
+            continue
+        factor *= SLOWER
+        if factor > SLOWEST:
+            return trajectory, refused.words
+        trajectory = timing.trajectory.slower(factor)

@@ -36,6 +36,11 @@ SMALLEST_STEP = 1e-4
 """Motion of a joint [rad or m] below which an interval is no longer divided: it counts as not free."""
 ROUNDING_M = 1e-6
 """Error of computed distances [m]."""
+FAR_M = 0.15
+"""Change of a distance [m] above which an interval is divided before distances are measured exactly."""
+TRIAL_STEP = 0.25
+"""Motion of a joint [rad or m] between two configurations that are checked before a motion is proven, since most
+motions that are not free are found so."""
 MAX_ROWS = 200_000
 """Largest number of pairs and intervals of one proof; a motion that needs more counts as not free."""
 
@@ -422,6 +427,26 @@ class CollisionModel:
                     found[frozenset((a, b))] = Meeting(a, b, distance, float(self.padding[i]))
         return sorted(found.values(), key=lambda each: each.distance_m)
 
+    def first_contact(self, path: Array) -> tuple[int, Meeting] | None:
+        """Checks a path of straight parts against the present poses.
+
+        Args:
+            path: Waypoints, m x n [rad or m].
+
+        Returns:
+            The number of the first waypoint after a part that is not free, and two shapes that are too near; None for a
+            free path.
+        """
+        for i, q in enumerate(path):
+            before = path[max(i - 1, 0)]
+            if (share := self.first_unproven(Line(before, q))) is not None:
+                at = before + share * (q - before)
+                near = self.meetings(at) or self.meetings(q)
+                if near:
+                    return i, near[0]
+                return i, Meeting("", "", 0.0, 0.0)
+        return None
+
     # --- Proofs
 
     def proves(self, motion: Motion) -> bool:
@@ -430,6 +455,11 @@ class CollisionModel:
 
     def edge(self, start: Array, end: Array) -> bool:
         """Returns whether the straight motion between two configurations is proven to be free."""
+        count = int(np.ceil(float(np.abs(end - start).max()) / TRIAL_STEP))
+        shares = np.arange(1, count) / max(count, 1)
+        for share in shares[np.argsort(np.abs(shares - 0.5))].tolist():
+            if not self.is_free(start + share * (end - start)):
+                return False
         return self.proves(Line(start, end))
 
     def first_unproven(self, motion: Motion) -> float | None:
@@ -442,7 +472,7 @@ class CollisionModel:
         gaps = self._bounds(q, which)
         t0, t1 = (np.full(len(which), time) for time in times)
         g0, g1 = gaps
-        exact0 = exact1 = which >= pairs
+        exact0, exact1 = which >= pairs, which >= pairs
         while len(which):
             step = motion.variation(t0, t1)
             change = (step * self._all_reach[which]).sum(axis=1)
@@ -456,15 +486,16 @@ class CollisionModel:
                 return float(t0[bad].min())
             if (bad := (g1 < 0.0) & exact1).any():
                 return float(t1[bad].min())
-            # exact distances where bounds did not suffice
-            if not (exact0.all() and exact1.all()):
+            measured = (exact0 & exact1) | (change > FAR_M)
+            if not measured.all():  # exact distances where bounds did not suffice
                 for at, gap, exact in ((t0, g0, exact0), (t1, g1, exact1)):
-                    for time in np.unique(at[~exact]).tolist():
-                        rows = np.flatnonzero((at == time) & ~exact)
+                    asked = ~exact & ~measured
+                    for time in np.unique(at[asked]).tolist():
+                        rows = np.flatnonzero((at == time) & asked)
                         gap[rows] = self._exact(known, motion, time, which[rows])
                         if (gap[rows] < 0.0).any():
                             return time
-                    exact[:] = True
+                    exact |= asked
                 continue
             if (step.max(axis=1) < SMALLEST_STEP).any() or len(which) > MAX_ROWS:
                 return float(t0[int(np.argmin(step.max(axis=1)))])

@@ -17,7 +17,6 @@ from ik_ros.solvers.global_search import GlobalConfig, GlobalSolver
 from robot_model.geometry import Pose, Vector
 from robot_model.limits import Limits
 
-from .collision import Group
 from .scene import PlanningScene, SceneRobot
 from .yaml_words import built
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from safe_robot.limits import LimitsConfig, MotionLimits
 
 if TYPE_CHECKING:
     from rpbi.world import World
+    from safe_robot.guard import Guard
 
 DEFAULT_LIMITS = LimitsConfig(acceleration=5.0, jerk=50.0)
 """Limits of robots whose limits are not given: the URDF's positions and velocities, 5 rad/s^2 and 50 rad/s^3."""
@@ -42,6 +43,8 @@ class SceneRobot:
 
     Attributes:
         postures: Named joint positions, shape (n,) each. `start` is the posture in which the robot came into the scene.
+        limits: Limits of the n joints, all finite but those of positions.
+        guard: The guard that checks plans, and the limits for which it was made; None before the first plan.
         never_checked: Pairs of links whose collisions are not checked, in addition to neighbours.
     """
 
@@ -59,6 +62,16 @@ class SceneRobot:
         self.positions = start
         self.postures: dict[str, np.ndarray] = {"start": start.copy()}
         self.never_checked: set[frozenset[str]] = set()
+        self.guard: tuple[Any, Guard] | None = None
+        self.set_limits(limits)
+
+    def set_limits(self, limits: LimitsConfig) -> None:
+        """Sets the limits of the joints, which may only narrow those of the URDF.
+
+        Raises:
+            ConfigError: If a limit is wider than in the URDF, or a joint is unknown.
+        """
+        model = self.model
         self.limits = with_finite_speeds(MotionLimits.of(model, limits, model.urdf_path))
 
     def read_srdf(self, path: str) -> None:

@@ -144,34 +144,51 @@ class _Blend(NamedTuple):
         return cls(ramp, whole - ramp)
 
 
-def timed(
-    joint_names: Sequence[str],
-    path: Array,
-    limits: JointLimits,
-    is_free: Callable[[Trajectory], float | None] | None = None,
-) -> Trajectory:
-    """Times a path of straight parts, whose corners are rounded where that is possible.
+class PathTiming:
+    """Times a path of straight parts, whose corners are rounded, except where the motion stops.
 
     Args:
         joint_names: Names of the n joints.
         path: Waypoints, m x n [rad or m]. The motion passes near inner waypoints, and through those at which it stops.
         limits: Limits of the joints.
-        is_free: Function that returns a time at which a motion is not free; None if the motion is free. The robot stops
-            at the waypoints where a rounded corner is not free.
+
+    Attributes:
+        trajectory: The timed motion.
     """
-    path = _distinct(path)
-    if len(path) < 2:
-        return Trajectory(joint_names, np.zeros(1), np.empty((0, 4, path.shape[1])), path[-1])
-    stops = {0, len(path) - 1}
-    while True:
-        ordered = sorted(stops)
-        parts = [_rounded(path[a : b + 1], limits) for a, b in zip(ordered, ordered[1:])]
-        trajectory, ends = _joined(joint_names, path, parts)
-        if is_free is None or len(stops) == len(path) or (time := is_free(trajectory)) is None:
-            return trajectory
-        corners = [time_at for part in ends for time_at in part]
-        inner = [(abs(at - time), number) for number, at in enumerate(corners) if number not in stops]
-        stops.add(min(inner)[1])
+
+    def __init__(self, joint_names: Sequence[str], path: Array, limits: JointLimits) -> None:
+        self._joint_names, self._path, self._limits = tuple(joint_names), _distinct(path), limits
+        self._stops = {0, len(self._path) - 1}
+        self._make()
+
+    def stop_near(self, time: float) -> bool:
+        """Stops at the rounded corner that is nearest to a time [s]; returns False if no rounded corner is left."""
+        rounded = [(abs(at - time), i) for i, at in enumerate(self._corners) if i not in self._stops]
+        if not rounded:
+            return False
+        self._stops.add(min(rounded)[1])
+        self._make()
+        return True
+
+    def stop_until(self, first_fault: Callable[[Trajectory], float | None]) -> Trajectory:
+        """Stops at corners until a function finds no fault, or no rounded corner is left; returns the motion.
+
+        Args:
+            first_fault: Function that returns the time of a fault of a motion [s]; None if there is none.
+        """
+        while (time := first_fault(self.trajectory)) is not None and self.stop_near(time):
+            pass
+        return self.trajectory
+
+    def _make(self) -> None:
+        path, ordered = self._path, sorted(self._stops)
+        if len(path) < 2:
+            nothing = np.empty((0, 4, path.shape[1]))
+            self.trajectory, self._corners = Trajectory(self._joint_names, np.zeros(1), nothing, path[-1]), [0.0]
+            return
+        parts = [_rounded(path[a : b + 1], self._limits) for a, b in zip(ordered, ordered[1:])]
+        self.trajectory, ends = _joined(self._joint_names, path, parts)
+        self._corners = [at for part in ends for at in part]
 
 
 def _distinct(path: Array) -> Array:

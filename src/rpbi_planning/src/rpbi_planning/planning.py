@@ -23,7 +23,7 @@ from .planner import PlanningProblem, length
 from .planners import PLANNERS
 from .scene import PlanningScene
 from .shortening import shortened
-from .timing import JointLimits, Trajectory, timed
+from .timing import JointLimits, PathTiming, Trajectory
 
 if TYPE_CHECKING:
     from rpbi.world import World
@@ -37,6 +37,9 @@ MAX_GOALS = 12
 """Largest number of configurations of a goal that planners try to reach."""
 OUTSIDE = 1e-3
 """Distance beyond a limit up to which a start is moved to the limit [rad or m]; measured positions are noisy."""
+RESERVE = 0.97, 0.95, 0.9
+"""Shares of the limits of velocity, acceleration and jerk that are used. The guard brakes in steps of its period, and
+passes the limits a little when a motion uses them fully."""
 LESS_M = 1e-4
 """A pair that is nearer than the padding at the start may come nearer by at most this distance [m]."""
 
@@ -89,6 +92,7 @@ def plan(
     options: Mapping[str, Any] | None = None,
     time_limit_s: float = 5.0,
     shorten_s: float = 0.3,
+    speed: float = 1.0,
     seed: int = 0,
     certify: bool = True,
     foresee: World | None = None,
@@ -110,6 +114,7 @@ def plan(
         options: Options of the planner.
         time_limit_s: Longest time for goals and path [s].
         shorten_s: Longest time for shortening [s].
+        speed: Factor of the velocities; the duration is divided by it.
         seed: Seed of random numbers.
         certify: Whether the motion is passed through the guard's checks.
         foresee: A world in whose fork the motion is simulated; the world itself does not change.
@@ -126,6 +131,8 @@ def plan(
     for key, value, least in (("time_limit_s", time_limit_s, 0.0), ("shorten_s", shorten_s, -1e-12)):
         if not (math.isfinite(value) and value > least):
             raise ValueError(f"{key}: expected a positive number of seconds, got {value}")
+    if not 0.0 < speed <= 1.0:
+        raise ValueError(f"speed: expected a factor above 0, at most 1, got {speed}")
     begin = time.monotonic()
     names = [robot] if isinstance(robot, str) else list(robot)
     if not names:
@@ -146,7 +153,7 @@ def plan(
         for member, positions in zip(members, full):
             member.positions = positions
         return _Plan(scene, joints, searching, seed, is_cancelled).run(
-            full, goal, constraints, planner, begin + time_limit_s, shorten_s, certify, foresee
+            full, goal, constraints, planner, begin + time_limit_s, shorten_s, speed, certify, foresee
         )
     finally:
         for member, positions in zip(members, kept):
@@ -169,6 +176,7 @@ class _Plan:
         planner: str,
         until: float,
         shorten_s: float,
+        speed: float,
         certify: bool,
         foresee: World | None,
     ) -> PlanResult:
@@ -200,13 +208,20 @@ class _Plan:
         if shorten_s > 0.0:
             path = shortened(path, model, time.monotonic() + shorten_s, self._seed, self._is_cancelled)
         self._clock.note("shortening")
-        limits = JointLimits(group.velocity, group.acceleration, group.jerk)
-        trajectory = timed(group.joint_names, path, limits, model.first_unproven)
+        velocity, acceleration, jerk = (
+            share * scale * each
+            for share, scale, each in zip(
+                RESERVE, (speed, speed**2, speed**3), (group.velocity, group.acceleration, group.jerk)
+            )
+        )
+        limits = JointLimits(velocity, acceleration, jerk)
+        timing = PathTiming(group.joint_names, path, limits)
+        trajectory = timing.stop_until(model.first_unproven)
         self._clock.note("timing")
         if (at := model.first_unproven(trajectory)) is not None:
             return self._failed(f"the timed motion is not proven to be free at {at:.3f} s")
         if certify:
-            trajectory, reason = certified(scene, group, trajectory, model)
+            trajectory, reason = certified(scene, group, timing)
             if reason:
                 self._clock.note("checking")
                 return self._failed(f"the guard's checks refuse the motion: {reason}")
