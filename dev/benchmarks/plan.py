@@ -1,7 +1,7 @@
-"""Plans in generated scenes: share of solved queries, times, lengths, and hits and limits found by an independent check.
+"""Plans in generated scenes: share of solved queries, times, lengths, and hits that an independent check finds.
 
-The oracle is PyBullet: it places the robots at each sample of a timed curve, and counts contacts. It shares no code with
-the planner, neither shapes nor distances nor kinematics.
+The oracle is PyBullet: it places the robots at each sample of a timed curve, and counts contacts. It shares neither
+shapes nor distances nor kinematics with the planner.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Pinocchio and hpp-fcl check all pairs of shapes in one configuration. A motion is proven by distances: between two
 configurations, the distance of a pair changes at most by the pair's reach times the motion of the joints, see
-`RobotModel.reach`. If the distances at both ends together exceed this change, the pair is free in between; otherwise the
-interval is divided (Schwarzer, Saha and Latombe, 2005, Adaptive dynamic collision checking).
+`RobotModel.reach`. If the distances at both ends together exceed this change, the pair is free in between. Otherwise,
+the interval is divided (Schwarzer, Saha and Latombe, 2005, Adaptive dynamic collision checking).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Margin(Protocol):
     reach: Array
 
     def margins(self, q: Array) -> Array:
-        """Returns the margins in k configurations, shape (k,); a configuration with a negative margin is not allowed."""
+        """Returns the margins in k configurations, shape (k,); a negative margin is not allowed."""
 
 
 class Motion(Protocol):
@@ -168,6 +168,11 @@ class Group:
         for at, columns, each in zip(self.slices, self.columns, positions):
             q[at] = each[columns]
         return q
+
+    @property
+    def motion_limits(self) -> tuple[Array, Array, Array]:
+        """Limits of velocity, acceleration and jerk, shape (n,) each."""
+        return self.velocity, self.acceleration, self.jerk
 
     @property
     def present(self) -> Array:

@@ -42,11 +42,11 @@ class PathConstraint(ABC):
 
     @abstractmethod
     def margin(self, poses: Array) -> Array:
-        """Returns margins for k poses of the link in the world, k x 4 x 4; a negative margin violates the constraint."""
+        """Returns margins for k poses of the link in the world, k x 4 x 4; a violation is a negative margin."""
 
     @abstractmethod
     def reach(self, group: Group, robot: int) -> Array:
-        """Returns n upper bounds on the change of the margin per rad or m of the joints of one of the group's robots."""
+        """Returns upper bounds on the change of the margin per rad or m of all driven joints of a robot."""
 
 
 @dataclass(frozen=True)

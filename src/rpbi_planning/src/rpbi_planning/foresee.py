@@ -42,7 +42,7 @@ class Foreseen(NamedTuple):
 
 def inputs_of(world: World, group: Group, trajectory: Trajectory) -> list[PlannedInput]:
     """Returns the joint targets of a motion, one for each tick; put them at these ticks to execute the motion."""
-    dt_s = world.clock.dt_s if hasattr(world.clock, "dt_s") else world.config.timeStep
+    dt_s = world.clock.dt_s
     count = int(np.ceil(trajectory.duration_s / dt_s)) + 1
     q = trajectory.at(np.arange(1, count + 1) * dt_s)
     found = []

@@ -208,13 +208,8 @@ class _Plan:
         if shorten_s > 0.0:
             path = shortened(path, model, time.monotonic() + shorten_s, self._seed, self._is_cancelled)
         self._clock.note("shortening")
-        velocity, acceleration, jerk = (
-            share * scale * each
-            for share, scale, each in zip(
-                RESERVE, (speed, speed**2, speed**3), (group.velocity, group.acceleration, group.jerk)
-            )
-        )
-        limits = JointLimits(velocity, acceleration, jerk)
+        scales = (share * speed**power for power, share in enumerate(RESERVE, 1))
+        limits = JointLimits(*(scale * each for scale, each in zip(scales, group.motion_limits)))
         timing = PathTiming(group.joint_names, path, limits)
         trajectory = timing.stop_until(model.first_unproven)
         self._clock.note("timing")
@@ -304,7 +299,7 @@ class _Plan:
             if not len(found.states):
                 return np.empty((0, len(start))), found.message
             per_robot.append(found.states)
-        states = _combined([group.of(each) for each in _products(per_robot)])
+        states = np.array([group.of(each) for each in _products(per_robot)])
         order = np.argsort(np.linalg.norm(states - start, axis=1))
         free, nearest = [], ""
         for q in states[order]:
@@ -339,31 +334,27 @@ class _Plan:
         if bound and not searching.keeps_constraints:
             kind = PLANNERS.find("projected")
             searching, planner = kind(kind.Config()), "projected"
-        kept = _roadmaps(self._scene, self._group, model, start)
+        kept = _kept(self._scene, model, bound)
         problem = PlanningProblem(model, start, goals, until, self._seed, self._is_cancelled, bound, kept)
         return searching.search(problem), planner
 
 
-def _roadmaps(scene: PlanningScene, group: Group, model: CollisionModel, start: Array) -> dict[str, Any]:
+def _kept(scene: PlanningScene, model: CollisionModel, bound: Sequence[BoundConstraint]) -> dict[str, Any]:
     """Returns what planners keep between plans, as long as nothing but the moving joints has changed."""
-    columns = [tuple(each) for each in group.columns]
-    still = [
-        np.delete(robot.positions, columns[group.robots.index(robot)] if robot in group.robots else []).tolist()
-        for robot in scene.robots.values()
-    ]
+    group = model.group
+    moving = {robot.name: columns for robot, columns in zip(group.robots, group.columns)}
+    still = [np.delete(each.positions, moving.get(name, [])).tolist() for name, each in scene.robots.items()]
     key = (
         scene.version,
         group.joint_names,
         repr(still),
         tuple(scene.poses.items()),
         model.padding.tobytes(),
-        repr([margin for margin in model.margins]),
+        repr([bound.constraint for bound in bound]),
     )
-    old = getattr(scene, "kept_by_planners", None)
-    if old is None or old[0] != key:
-        scene.kept_by_planners = old = (key, {})
-    kept: dict[str, Any] = old[1]
-    return kept
+    if scene.kept_by_planners[0] != key:
+        scene.kept_by_planners = key, {}
+    return scene.kept_by_planners[1]
 
 
 def _inside(model: CollisionModel, q: Array) -> list[MarginViolation]:
@@ -385,7 +376,3 @@ def _products(per_robot: Sequence[Array]) -> list[list[Array]]:
     for states in per_robot:
         found = [[*before, state] for before in found for state in states[:MAX_GOALS]]
     return found[: MAX_GOALS**2]
-
-
-def _combined(states: Sequence[Array]) -> Array:
-    return np.array(states)

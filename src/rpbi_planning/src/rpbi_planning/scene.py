@@ -142,6 +142,7 @@ class PlanningScene:
         allowed: Pairs of names that may touch: bodies, or links as `robot/link`.
         padding_m: Least distance from bodies and from other robots [m].
         self_padding_m: Least distance between links of one robot [m].
+        kept_by_planners: What planners keep between plans, and a description of the scene for which it is valid.
         version: Number of changes of robots, bodies and attachments; poses and joint positions do not count.
     """
 
@@ -153,6 +154,7 @@ class PlanningScene:
         self.allowed: set[frozenset[str]] = set()
         self.padding_m, self.self_padding_m = padding_m, self_padding_m
         self.version = 0
+        self.kept_by_planners: tuple[Any, dict[str, Any]] = (None, {})
 
     @classmethod
     def from_yaml(cls, path: str | Path, **options: float) -> PlanningScene:
