@@ -145,21 +145,21 @@ class Oracle:
     def __init__(self, made: BenchScene) -> None:
         self._pb = pybullet.connect(pybullet.DIRECT)
         self._robots, self._columns = list[int](), list[tuple[int, int, int]]()
+        on = {"physicsClientId": self._pb}
         flags = pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
         for robot in made.scene.robots.values():
-            body = pybullet.loadURDF(robot.model.urdf_path, *robot.base, useFixedBase=True, flags=flags,
-                                     physicsClientId=self._pb)  # fmt: skip
+            body = pybullet.loadURDF(robot.model.urdf_path, *robot.base, useFixedBase=True, flags=flags, **on)
             self._robots.append(body)
-            names = {pybullet.getJointInfo(body, i, self._pb)[1].decode(): i
-                     for i in range(pybullet.getNumJoints(body, self._pb))}  # fmt: skip
+            joints = range(pybullet.getNumJoints(body, **on))
+            names = {pybullet.getJointInfo(body, i, **on)[1].decode(): i for i in joints}
             many = len(made.scene.robots) > 1
             for column, name in enumerate(made.group.joint_names):
                 if not many or name.startswith(f"{robot.name}/"):
                     self._columns.append((body, names[name.split("/")[-1]], column))
-        for body_name, shapes in made.scene.bodies.items():
-            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[each / 2.0 for each in shapes[0].size],
-                                                  physicsClientId=self._pb)  # fmt: skip
-            pybullet.createMultiBody(0.0, shape, -1, *made.scene.poses[body_name], physicsClientId=self._pb)
+        for name, (box, *_) in made.scene.bodies.items():
+            half = [each / 2.0 for each in box.size]
+            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **on)
+            pybullet.createMultiBody(0.0, shape, -1, *made.scene.poses[name], **on)
         self._ignored = {pair for q in (made.queries[0].start, made.queries[-1].goal) for pair in self._touching(q)}
 
     def _touching(self, q: np.ndarray) -> set[tuple[int, int, int, int]]:
@@ -256,8 +256,9 @@ def run(quick: bool) -> list[Result]:
         ours.append(len(sampled) / (time.process_time() - begin))
         theirs.append(oracle.checks_per_s(sampled[: len(sampled) // 5], PADDING_M))
         oracle.close()
-    return [*_results(tallies), Result("plan", "checks a second, against getClosestPoints", statistics.median(ours), "/s",
-                                       statistics.median(theirs), Target(2.5, True, True))]  # fmt: skip
+    figure, least = "checks a second, against getClosestPoints", Target(2.5, True, True)
+    checks = Result("plan", figure, statistics.median(ours), "/s", statistics.median(theirs), least)
+    return [*_results(tallies), checks]
 
 
 def _measure(made: BenchScene, oracle: Oracle, tally: Tally, longest_s: float, step: float, quick: bool) -> None:

@@ -34,6 +34,8 @@ from .scene import PlanningScene, SceneRobot
 Array = np.ndarray
 SMALLEST_STEP = 1e-4
 """Motion of a joint [rad or m] below which an interval is no longer divided: it counts as not free."""
+NEAR_M = 1e-3
+"""Pairs of links that are nearly always nearer than this beyond the padding are near by construction, and left out."""
 ROUNDING_M = 1e-6
 """Error of computed distances [m]."""
 FAR_M = 0.15
@@ -197,7 +199,8 @@ _hulls: dict[tuple[str, tuple[str, ...]], dict[str, list[Hull]]] = {}
 def _self_pairs(robot: SceneRobot, padding_m: float) -> list[tuple[str, str]]:
     key = robot.model.urdf_path, robot.model.joint_names, padding_m
     if key not in _pairs:
-        _pairs[key] = pairs_that_may_meet(robot.model, LinkDistances(robot.model, FclShapes(robot.model)), padding_m)
+        distances = LinkDistances(robot.model, FclShapes(robot.model))
+        _pairs[key] = pairs_that_may_meet(robot.model, distances, padding_m + NEAR_M)
     return [pair for pair in _pairs[key] if frozenset(pair) not in robot.never_checked]
 
 
@@ -225,7 +228,6 @@ class CollisionModel:
 
     def __init__(self, scene: PlanningScene, group: Group, margins: Sequence[Margin] = ()) -> None:
         self.scene, self.group, self.margins = scene, group, list(margins)
-        self.version = scene.version
         self.model, self.shapes = pin.Model(), list[_Shape]()
         self.geometry = pin.GeometryModel()
         self._joint_of_link: dict[tuple[int, str], tuple[int, Array]] = {}
@@ -334,6 +336,12 @@ class CollisionModel:
         self.second = np.array([row[1] for row in rows], int)
         self.padding = np.array([row[2] for row in rows])
         self.reach = np.array([row[3] for row in rows]).reshape(-1, n)
+        self._own_padding = self.padding
+        self.use(self.group, self.margins)
+
+    def use(self, group: Group, margins: Sequence[Margin]) -> None:
+        """Replaces the margins, and the group by another one with the same joints."""
+        self.group, self.margins = group, list(margins)
         self._all_reach = np.concatenate([self.reach, *(each.reach[None] for each in self.margins)])
 
     def _radius(self, shape: _Shape) -> float:
@@ -361,7 +369,7 @@ class CollisionModel:
     # --- Poses
 
     def update(self) -> None:
-        """Takes the present poses of bodies and joints that the group does not move."""
+        """Takes the present poses of bodies, and the scene's paddings again."""
         places = np.empty((len(self.shapes), 4, 4))
         for i, shape in enumerate(self.shapes):
             pose = shape.hull.pose
@@ -379,7 +387,7 @@ class CollisionModel:
             frames = [robot.model.frames.place(self.shapes[i].link) for i in which]
             local = np.array([in_frame @ places[i] for i, (_, in_frame) in zip(which, frames)]).reshape(-1, 4, 4)
             self._links.append((r, np.array(which, int), np.array([frame for frame, _ in frames], int), local))
-        self.set_paddings(self.padding)
+        self.set_paddings(self._own_padding)
 
     def set_paddings(self, padding: Array) -> None:
         """Sets the least allowed distance of each pair, shape (number of pairs,) [m]."""
@@ -560,6 +568,24 @@ def _ball_and_box(hull: Hull) -> tuple[Array, Array, float]:
     middle = (low + high) / 2.0
     radius = (np.linalg.norm(solid.balls[:, :3] - middle, axis=1) + solid.balls[:, 3]).max()
     return middle, (high - low) / 2.0, float(radius)
+
+
+def collision_model(scene: PlanningScene, group: Group, margins: Sequence[Margin] = ()) -> CollisionModel:
+    """Returns the collision model of a scene and a group, which is kept until the scene changes.
+
+    See `CollisionModel` for arguments and errors.
+    """
+    names = [robot.name for robot in group.robots]
+    others = tuple((name, each.positions.tobytes()) for name, each in scene.robots.items() if name not in names)
+    ignored = sum(len(each.never_checked) for each in scene.robots.values())
+    key = scene.version, tuple(names), group.joint_names, scene.padding_m, scene.self_padding_m, others, ignored
+    if scene.kept_model[0] != key:
+        scene.kept_model = key, CollisionModel(scene, group)
+    model = scene.kept_model[1]
+    assert isinstance(model, CollisionModel)
+    model.use(group, margins)
+    model.update()
+    return model
 
 
 def _is_allowed(allowed: set[frozenset[str]], a: str, b: str) -> bool:

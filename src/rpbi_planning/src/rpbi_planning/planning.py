@@ -16,7 +16,7 @@ from safe_robot.commands.escape import find_escape
 from safe_robot.limits import MotionLimits
 
 from .certify import certified
-from .collision import CollisionModel, Group, Meeting
+from .collision import CollisionModel, Group, Meeting, collision_model
 from .constraints import BoundConstraint, PathConstraint
 from .goals import Goal
 from .planner import PlanningProblem, length
@@ -182,7 +182,7 @@ class _Plan:
     ) -> PlanResult:
         group, scene = self._group, self._scene
         bound = [BoundConstraint(each, group) for each in constraints]
-        model = CollisionModel(scene, group, bound)
+        model = collision_model(scene, group, bound)
         start = group.of(full)
         if reason := self._outside(start):
             return self._failed(reason)
@@ -254,8 +254,6 @@ class _Plan:
 
     def _adapt_to_start(self, model: CollisionModel, start: Array) -> str:
         """Lowers the paddings of pairs that are nearer at the start; returns a reason if shapes penetrate there."""
-        if model.is_free(start):
-            return ""
         distances = model.distances(start)
         if (distances < 0.0).any():
             return f"the start is in collision: {self._collision(model, start)}"

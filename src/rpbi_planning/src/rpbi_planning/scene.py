@@ -143,6 +143,7 @@ class PlanningScene:
         padding_m: Least distance from bodies and from other robots [m].
         self_padding_m: Least distance between links of one robot [m].
         kept_by_planners: What planners keep between plans, and a description of the scene for which it is valid.
+        kept_model: The collision model of the last plan, and a description of the scene for which it is valid.
         version: Number of changes of robots, bodies and attachments; poses and joint positions do not count.
     """
 
@@ -155,6 +156,7 @@ class PlanningScene:
         self.padding_m, self.self_padding_m = padding_m, self_padding_m
         self.version = 0
         self.kept_by_planners: tuple[Any, dict[str, Any]] = (None, {})
+        self.kept_model: tuple[Any, Any] = (None, None)
 
     @classmethod
     def from_yaml(cls, path: str | Path, **options: float) -> PlanningScene:
