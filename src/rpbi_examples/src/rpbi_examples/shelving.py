@@ -8,9 +8,9 @@ from robot_model.geometry import Pose, Vector, plus
 
 LINK = "panda_grasptarget"
 """Link between the fingertips. Its z axis points away from the hand; the fingers close along its y axis."""
-BEFORE_M, LIFT_M, GAP_M = 0.16, 0.02, 0.003
-"""Distance of the hand in front of a box before and after a grasp, height to which a box is lifted before the transport,
-and height above the board at which the box is released [m].
+BEFORE_M, LIFT_M, GAP_M = 0.12, 0.02, 0.003
+"""Distance of the hand in front of a box before and after a grasp, height of the lift before the transport, and height
+above the board at which the box is released [m].
 """
 
 

@@ -183,6 +183,7 @@ class MotionPlannerNode:
             InterfaceError: If the request or the scene is not valid.
             ValueError: Likewise.
         """
+        self._topics.wait()
         config, robot = self._config, self._topics.robot(request.robot)
         if at_present and request.start.name:
             raise InterfaceError("start: expected none, since the motion starts at the present positions")
@@ -269,6 +270,7 @@ class MotionPlannerNode:
             report(MoveRobotFeedback(phase=PLANNING, plans=plans))
             end_s = time.monotonic() + self._config.wait_s
             while not is_cancelled():
+                planned.request.seed += 1  # another attempt with the same random numbers would fail alike
                 planned = self._plan(planned.request, is_cancelled)
                 if planned.result.success:
                     break

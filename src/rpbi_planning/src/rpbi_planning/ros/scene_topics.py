@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Mapping
 from functools import partial
 
@@ -29,6 +30,8 @@ from rpbi.world.saved.description import WorldDescription
 from rpbi_planning.node_configs import MotionPlannerConfig
 from rpbi_planning.scene import PlanningScene, SceneRobot
 
+FIRST_S, POLL_S = 10.0, 0.05
+"""Longest time to wait for the first messages, and time between two looks [s]."""
 CONTENTS = ("add", "remove")
 """Commands that change the bodies of a world."""
 
@@ -87,6 +90,15 @@ class SceneTopics:
             expected = f"a robot of the world, got '{name}'" if name else "the name of a robot"
             raise InterfaceError(f"robot: expected {expected}; there is {known}")
         return robots[name]
+
+    def wait(self) -> None:
+        """Waits until the world and joint states of all its robots have come, at most for `FIRST_S`."""
+        end_s = time.monotonic() + FIRST_S
+        while time.monotonic() < end_s and not rospy.is_shutdown():
+            with self.lock:
+                if self._scene is not None and self._subscribers.keys() <= self._joints.keys():
+                    return
+            time.sleep(POLL_S)
 
     def present(self) -> PlanningScene:
         """Returns the scene with the present poses and joint positions. Held bodies stay at the link that holds them.

@@ -25,7 +25,7 @@ CELL_M = 0.03
 """Distance between two positions on a rail at which distances are measured [m]."""
 MARGIN_M = 0.04
 """Least distance between arm and carriage [m], in addition to half a cell."""
-TURN_S = 0.4
+TURN_S = 0.3
 """Time in which an arm changes from full speed along its path to rest, or from rest to full speed [s]."""
 
 
