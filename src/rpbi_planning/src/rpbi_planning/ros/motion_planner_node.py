@@ -18,10 +18,10 @@ from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.bodies.robots.robot import Robot
 from rpbi.ros.headers import world_frame
+from rpbi_planning import plan
 from rpbi_planning.msg import MotionRequest, MoveRobotAction, MoveRobotFeedback, MoveRobotResult
 from rpbi_planning.node_configs import MotionPlannerConfig
 from rpbi_planning.path_check import PathCheck
-from rpbi_planning.plan import plan
 from rpbi_planning.scene import PlanningScene
 from rpbi_planning.srv import (
     PlanAndMove,
