@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 
 import actionlib
@@ -259,3 +260,13 @@ def test_example_configuration_fits_the_schema():
     assert [*config.postures["ready"].values()] == READY
     with pytest.raises(Exception, match="speed"):
         MotionPlannerConfig.parse(yaml.safe_load("speed: 2.0"), "planner.yaml")
+
+
+def test_missing_extra_ends_the_node_with_one_line(ros, tmp_path):
+    (tmp_path / "pinocchio.py").write_text("raise ImportError('none here', name='pinocchio')\n")
+    modules = os.pathsep.join((str(tmp_path), os.environ["PYTHONPATH"]))
+    node = ros.start(["rosrun", "rpbi_planning", "motion_planner_node.py"], PYTHONPATH=modules)
+    wait_until(lambda: node.poll() is not None, "it has ended")
+    (line,) = [line for line in ros.output(node).splitlines() if "not installed" in line]
+    assert "./rpbi setup planning" in line and "FATAL" in line
+    assert "Traceback" not in ros.output(node) and node.returncode == 1
