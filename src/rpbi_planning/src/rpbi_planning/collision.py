@@ -32,7 +32,7 @@ from robot_model.collision.fcl import FclShapes, Hull, hull_of, hulls_of_links
 from .scene import PlanningScene, SceneRobot
 
 Array = np.ndarray
-SMALLEST_STEP = 1e-4
+SMALLEST_STEP = 1e-5
 """Motion of a joint [rad or m] below which an interval is no longer divided: it counts as not free."""
 NEAR_M = 1e-3
 """Pairs of links that are nearly always nearer than this beyond the padding are near by construction, and left out."""
@@ -379,7 +379,7 @@ class CollisionModel:
             places[i] = pose
         self._local = places
         boxes = [_ball_and_box(shape.hull) for shape in self.shapes]
-        self._middle, self._half = (np.array([box[i] for box in boxes]) for i in (0, 1))
+        self._middle, self._half = (np.array([box[i] for box in boxes]).reshape(-1, 3) for i in (0, 1))
         self._radii = np.array([radius for _, _, radius in boxes])
         self._links: list[tuple[int, Array, Array, Array]] = []
         for r, robot in enumerate(self.group.robots):

@@ -40,7 +40,7 @@ OUTSIDE = 1e-3
 RESERVE = 0.97, 0.95, 0.9
 """Shares of the limits of velocity, acceleration and jerk that are used. The guard brakes in steps of its period, and
 passes the limits a little when a motion uses them fully."""
-LESS_M = 1e-4
+LESS_M = 3e-4
 """A pair that is nearer than the padding at the start may come nearer by at most this distance [m]."""
 
 
@@ -112,7 +112,7 @@ def plan(
         constraints: Constraints that the first robot keeps on the whole path.
         planner: Name of the planner in `PLANNERS`, or `module:Class`.
         options: Options of the planner.
-        time_limit_s: Longest time for goals and path [s].
+        time_limit_s: Longest time for goals and path [s]; the model of a new scene is made before.
         shorten_s: Longest time for shortening [s].
         speed: Factor of the velocities; the duration is divided by it.
         seed: Seed of random numbers.
@@ -133,7 +133,6 @@ def plan(
             raise ValueError(f"{key}: expected a positive number of seconds, got {value}")
     if not 0.0 < speed <= 1.0:
         raise ValueError(f"speed: expected a factor above 0, at most 1, got {speed}")
-    begin = time.monotonic()
     names = [robot] if isinstance(robot, str) else list(robot)
     if not names:
         raise ValueError("robot: expected at least one name, got none")
@@ -153,7 +152,7 @@ def plan(
         for member, positions in zip(members, full):
             member.positions = positions
         return _Plan(scene, joints, searching, seed, is_cancelled).run(
-            full, goal, constraints, planner, begin + time_limit_s, shorten_s, speed, certify, foresee
+            full, goal, constraints, planner, time_limit_s, shorten_s, speed, certify, foresee
         )
     finally:
         for member, positions in zip(members, kept):
@@ -174,7 +173,7 @@ class _Plan:
         goal: Goal | Mapping[str, Goal],
         constraints: Sequence[PathConstraint],
         planner: str,
-        until: float,
+        time_limit_s: float,
         shorten_s: float,
         speed: float,
         certify: bool,
@@ -192,6 +191,7 @@ class _Plan:
         if reason := self._adapt_to_start(model, start):
             return self._failed(reason)
         self._clock.note("scene")
+        until = time.monotonic() + time_limit_s
         goals, reason = self._goals(model, full, start, goal, bound)
         self._clock.note("goals")
         if reason:
