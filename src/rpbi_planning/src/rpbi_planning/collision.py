@@ -87,7 +87,9 @@ class Margin(Protocol):
 class Motion(Protocol):
     """A motion of n joints from time 0 to `duration`."""
 
-    duration: float
+    @property
+    def duration(self) -> float:
+        """Duration of the motion."""
 
     def at(self, times: Array) -> Array:
         """Returns the positions at k times, k x n [rad or m]."""
@@ -99,7 +101,10 @@ class Motion(Protocol):
 class Line:
     """The straight motion from one configuration to another, from time 0 to 1."""
 
-    duration = 1.0
+    @property
+    def duration(self) -> float:
+        """See `Motion`."""
+        return 1.0
 
     def __init__(self, start: Array, end: Array) -> None:
         self._start, self._change = start, end - start
@@ -228,6 +233,7 @@ class CollisionModel:
 
     def __init__(self, scene: PlanningScene, group: Group, margins: Sequence[Margin] = ()) -> None:
         self.scene, self.group, self.margins = scene, group, list(margins)
+        self.version = scene.version
         self.model, self.shapes = pin.Model(), list[_Shape]()
         self.geometry = pin.GeometryModel()
         self._joint_of_link: dict[tuple[int, str], tuple[int, Array]] = {}

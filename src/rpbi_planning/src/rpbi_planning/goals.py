@@ -109,7 +109,7 @@ class NamedGoal(Goal):
             raise UnknownNameError("posture", self.name, robot.postures)
         wanted = start.copy()
         wanted[list(moving)] = robot.postures[self.name][list(moving)]
-        return JointGoal(wanted).states(scene, robot, moving, start, seed)
+        return JointGoal(wanted.tolist()).states(scene, robot, moving, start, seed)
 
 
 @dataclass(frozen=True)

@@ -372,7 +372,7 @@ class PlanningScene:
     def link_pose(self, robot: str, link: str, positions: Sequence[float] | None = None) -> Pose:
         """Returns the pose of a link in the world, by default in the robot's present configuration."""
         owner = self.robot(robot)
-        return owner.base @ owner.model.pose(owner.positions if positions is None else positions, link)
+        return owner.base @ owner.model.pose(owner.positions.tolist() if positions is None else positions, link)
 
     def body_pose(self, body: str) -> Pose:
         """Returns the pose of a body in the world.

@@ -20,9 +20,9 @@ def built(table: Mapping[str, type[Any]], kind: str, data: Mapping[str, Any]) ->
     """
     if not isinstance(data, Mapping):
         raise ValueError(f"{kind}: expected a mapping, got {data!r}")
-    name = data.get("type")
+    name = str(data.get("type"))
     if name not in table:
-        raise ValueError(f"{kind}: type: expected one of {', '.join(table)}, got {name!r}{hint(str(name), table)}")
+        raise ValueError(f"{kind}: type: expected one of {', '.join(table)}, got {name!r}{hint(name, table)}")
     known = {each.name: each for each in fields(table[name])}
     for key in data:
         if key != "type" and key not in known:

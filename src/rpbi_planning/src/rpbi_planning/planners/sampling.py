@@ -26,7 +26,7 @@ class OmplConfig(PlannerConfig):
     range: NonNegative = Field(0.0, description="Longest motion that is tried at once [rad or m]; 0: OMPL's choice.")
 
 
-class _Valid(base.StateValidityChecker):  # type: ignore[misc]
+class _Valid(base.StateValidityChecker):
     def __init__(self, space: Any, model: CollisionModel) -> None:
         super().__init__(space)
         self._model, self._n = model, len(model.group.joint_names)
@@ -35,7 +35,7 @@ class _Valid(base.StateValidityChecker):  # type: ignore[misc]
         return bool(self._model.is_free(np.array(state[0 : self._n])))
 
 
-class _Proven(base.MotionValidator):  # type: ignore[misc]
+class _Proven(base.MotionValidator):
     def __init__(self, space: Any, model: CollisionModel) -> None:
         super().__init__(space)
         self._model, self._n = model, len(model.group.joint_names)
