@@ -146,6 +146,7 @@ BY_FEATURE = {
     "rpbi_data",
     "rpbi_examples",
     "rpbi_mpc",
+    "rpbi_planning",
     "rpbi_ros2",
     "rpbi_utils",
     "safe_robot",

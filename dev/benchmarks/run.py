@@ -42,7 +42,7 @@ WHEN_NAMED = (
         "live_plot",
         "passivity",
     ),
-    *("press", "pushing", "recording", "soak", "streams", "teleop", "verify"),
+    *("plan", "press", "pushing", "recording", "soak", "streams", "teleop", "verify"),
 )
 """Those that take too long to run with the others."""
 FIND_RENDERER = """

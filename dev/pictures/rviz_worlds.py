@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import rospy
 from files import write_png
-from geometry_msgs.msg import Point, PoseStamped
+from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from labels import colour_image, depth_image, inset, label, with_legend
 from nav_msgs.msg import Path as PathMessage
 from PIL import Image
@@ -27,8 +27,13 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose
+from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import Contacts
 from rpbi_examples.motions import CIRCLE_PERIOD_S, hand_position
+from rpbi_examples.shelving import LEFT, LINK, RIGHT
+from rpbi_planning.msg import MotionRequest
+from rpbi_planning.ros.plan_markers import GHOST_HZ
+from rpbi_planning.srv import PlanAndMove, PlanMotion
 
 ROOT = Path(__file__).resolve().parents[2]
 RVIZ = ROOT / "src/rpbi_examples/rviz"
@@ -232,6 +237,41 @@ def dual_iiwa(path: Path) -> None:
         stage.stop_world()
         picture = stage.still_picture()
     write_png(path, picture)
+
+
+def planning(path: Path) -> None:
+    """A plan from one bookcase into the other: its path, the goal, and the ghost at some places of the path."""
+    view = View((0.25, -0.05, 0.45), 2.1, 0.55, 0.35)
+    ghosts = {"Class": "rviz/MarkerArray", "Marker Topic": "/pictures/ghosts"}
+    with Stage(1280, 720) as stage:
+        stage.launch("planning_example.launch", "move:=false")
+        stage.rviz(RVIZ / "planning_example.rviz", {"Goal": None, "Ghost": None, "Ghosts": ghosts}, **view.of_rviz)
+        publisher = rospy.Publisher("/pictures/ghosts", MarkerArray, queue_size=1, latch=True)
+        rospy.wait_for_service("planner/plan_and_move")
+        move = rospy.ServiceProxy("planner/plan_and_move", PlanAndMove)
+        wait_until(lambda: move(request_to(LEFT.hand_at((0.15, 0.56, 0.27)))).success, "the hand is between the boards")
+        moments: list[MarkerArray] = []
+        rospy.Subscriber("planner/ghost", MarkerArray, moments.append, queue_size=100)
+        plan = rospy.ServiceProxy("planner/plan", PlanMotion)(request_to(RIGHT.hand_at((0.42, -0.56, 0.62))))
+        frames = plan.trajectory.points[-1].time_from_start.to_sec() * GHOST_HZ
+        wait_until(lambda: len(moments) > frames, "the ghost has come to the goal")
+        shown = MarkerArray()
+        for number, share in enumerate((0.25, 0.5, 0.75)):
+            for marker in moments[int(share * frames)].markers:
+                marker.id += 1000 * number
+                shown.markers.append(marker)
+        publisher.publish(shown)
+        stage.stop_world()
+        picture = stage.still_picture()
+    lines = (("#2673d9", "path of the hand, and the ghost of the robot on it"), ("#2e9e52", "goal"))
+    write_png(path, with_legend(picture, lines))
+
+
+def request_to(pose: Pose) -> MotionRequest:
+    """Returns the request for a motion of the hand to a pose in the world."""
+    request = MotionRequest(link=LINK, seed=1)
+    request.pose.pose.position, request.pose.pose.orientation = Point(*pose.position), Quaternion(*pose.quat_xyzw)
+    return request
 
 
 def lfd_rviz(path: Path) -> None:

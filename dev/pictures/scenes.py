@@ -55,6 +55,7 @@ SCENES = {
     "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 1.0, 7.0, 3.96, 0.75),
     "factory": View((1.2, 0.3, 1.7), (0.36, 0.02, 0.95), 39.0, 2.0, speed=4.0, still_s=12.0),
     "dual_arm": View((2.2, 1.2, 1.5), (0.33, 0.05, 0.6), 32.0, speed=1.5, still_s=5.0),
+    "shelves": View((-1.3, 1.7, 1.9), (0.42, 0.0, 0.85), 38.0, speed=4.0, still_s=4.0),
 }
 """Views of the scenes."""
 CLUTTER = View((0.60, -0.52, 1.00), (0.0, 0.0, 0.46), 46.0, end_s=2.0, still_s=3.0, speed=0.5)
@@ -154,6 +155,11 @@ def draw_factory(path: Path) -> None:
 def draw_dual_arm(path: Path) -> None:
     """Writes the moving picture of the scene `dual_arm`."""
     movie("dual_arm", path)
+
+
+def draw_shelves(path: Path) -> None:
+    """Writes the moving picture of the scene `shelves`."""
+    movie("shelves", path)
 
 
 def draw_clutter(path: Path) -> None:

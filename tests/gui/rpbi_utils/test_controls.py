@@ -254,6 +254,25 @@ def test_buttons_of_a_controller_call_its_services(controls):
     wait_until(lambda: "mpc_step" not in controls.widgets, "the buttons go with the controller")
 
 
+def test_buttons_of_a_planner_call_its_services(controls):
+    controls.have_running()
+    assert "planner_plan" not in controls.widgets, "there is no planner"
+    called, services = [], []
+    for name in ("plan_to_frame", "move", "stop"):
+        answer = TriggerResponse(True, f"answer of {name}")
+        services.append(
+            rospy.Service(f"/planner/{name}", Trigger, lambda _, name=name, answer=answer: called.append(name) or answer)
+        )
+    try:
+        for title, name in (("Plan", "plan_to_frame"), ("Move", "move"), ("Stop", "stop")):
+            controls.click(f"planner_{title.lower()}")
+            controls.wait_for("message", f"{title}: answer of {name}")
+        assert called == ["plan_to_frame", "move", "stop"]
+    finally:
+        for service in services:
+            service.shutdown()
+
+
 def test_window_causes_no_loss_of_joint_states(controls):
     controls.have_running()
     states = controls.system.listen("/rpbi/iiwa/joint_states", JointState)

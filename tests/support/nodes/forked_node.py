@@ -32,6 +32,7 @@ PACKAGES = {
     "motion_primitives",
     "operator_node",
     "rpbi_mpc",
+    "rpbi_planning",
     "ros_pybullet_interface",
     "rpbi_data",
     "rpbi_examples",

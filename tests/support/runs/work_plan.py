@@ -52,6 +52,7 @@ NOT_QUICK = (
 EXTRA_OF = {
     "pinocchio": "ik",
     "daqp": "ik",
+    "ompl": "planning",
     "casadi": "mpc",
     "cv2": "tags",
     "viser": "html",

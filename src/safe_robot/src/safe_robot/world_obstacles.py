@@ -36,7 +36,7 @@ def obstacles_of_world(path: str, joints: Set[str], robot: str | None = None) ->
             shape._replace(pose=base.inverse() @ shape.pose)
             for body in world.bodies.values()
             if body is not own and not body.is_soft
-            for shape in _shapes_of(body, path)
+            for shape in shapes_of_body(body, path)
         ]
     finally:
         world.close()
@@ -60,7 +60,16 @@ def _joints_of(body: Body) -> set[str]:
     return {body.pb.getJointInfo(body.body_id, i)[1].decode() for i in range(body.pb.getNumJoints(body.body_id))}
 
 
-def _shapes_of(body: Body, path: str) -> Iterator[Obstacle]:
+def shapes_of_body(body: Body, path: str) -> Iterator[Obstacle]:
+    """Yields the collision shapes of a body in their present poses in the world.
+
+    Args:
+        body: A body that is not soft.
+        path: Source of the body, for messages.
+
+    Raises:
+        ConfigError: If the body has a shape that `Obstacle` cannot describe.
+    """
     pb = body.pb
     for link in range(-1, pb.getNumJoints(body.body_id)):
         if link < 0:

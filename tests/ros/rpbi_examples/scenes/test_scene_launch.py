@@ -23,6 +23,7 @@ BOUNDS = {
     },
     "handover": {"held by the robot alone [s]": (5.0, 20.0), "largest force on the person [N]": (1.0, 20.0)},
     "talos": {"hand error [mm]": (0.0, 10.0), "largest lean [deg]": (1.0, 10.0), "feet slip [mm]": (0.0, 5.0)},
+    "shelves": {"waited [s]": (0.0, 60.0)},
     "factory": {"parts placed": (6.0, 6.0), "smallest distance of the arms [mm]": (50.0, 500.0)},
 }
 """Least and largest value of some figures."""

@@ -19,8 +19,8 @@ def bench(
 
     Args:
         NAME: benchmark to run; by default all but browser, controls, datasets, doors, dressing, examples, farm, forks,
-            guard_faults, gym, haptics, keyframes, lfd, live_plot, passivity, press, pushing, recording, soak, streams,
-            teleop and verify
+            guard_faults, gym, haptics, keyframes, lfd, live_plot, passivity, plan, press, pushing, recording, soak,
+            streams, teleop and verify
         quick: measure for a shorter time, which is less accurate
         json: file to which the figures are written
         page: also write the figures, with machine, date and commit, to docs/results.md, which keeps the figures of

@@ -50,6 +50,7 @@ WRITERS = (
     "ik_ros.node_configs:schema_files",
     "motion_primitives.node_configs:schema_files",
     "rpbi_mpc.node_configs:schema_files",
+    "rpbi_planning.node_configs:schema_files",
     "rpbi_utils.schemas:schema_files",
     "safe_robot.schemas:schema_files",
     "rpbi.gym.schemas:schema_files",

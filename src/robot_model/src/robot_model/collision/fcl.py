@@ -58,16 +58,7 @@ class FclShapes:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
-        self._hulls: dict[str | int, list[Hull]] = {}
-        for link in robot.links:
-            frame, pose = robot.frames.place(link)
-            try:
-                shapes = collision_shapes(robot.document, link)
-                hulls = [_hull(*each[:2], each.mesh_file, frame, pose @ each.pose) for each in shapes]
-            except (ValueError, OSError) as error:
-                raise ConfigError([Problem(robot.urdf_path, f"link '{link}'", str(error))]) from None
-            if hulls:
-                self._hulls[link] = hulls
+        self._hulls: dict[str | int, list[Hull]] = {**hulls_of_links(robot)}
         self.links = tuple(robot_link for robot_link in robot.links if robot_link in self._hulls)
         self.place(np.zeros(len(robot.joint_names)))
 
@@ -77,8 +68,7 @@ class FclShapes:
 
     def put(self, number: int, obstacle: Obstacle) -> None:
         """See `Shapes`."""
-        pose = matrix_of(*obstacle.pose)
-        self._hulls[number] = [_hull(obstacle.kind, obstacle.link_size, obstacle.mesh_file, 0, pose, obstacle.corners)]
+        self._hulls[number] = [hull_of(obstacle)]
 
     def move(self, number: int, pose: Pose) -> None:
         """See `Shapes`."""
@@ -118,6 +108,35 @@ class FclShapes:
         """See `Shapes`."""
         placed = [hull.solid.moved(0, self._frames[hull.frame] @ hull.pose).balls for hull in self._hulls[link]]
         return max(float((np.linalg.norm(balls[:, :3] - origin, axis=1) + balls[:, 3]).max()) for balls in placed)
+
+
+def hulls_of_links(robot: RobotModel) -> dict[str, list[Hull]]:
+    """Returns the collision shapes of a robot's links, indexed by link name; links without a shape are left out.
+
+    Raises:
+        ConfigError: If a mesh cannot be read.
+    """
+    found = {}
+    for link in robot.links:
+        frame, pose = robot.frames.place(link)
+        try:
+            shapes = collision_shapes(robot.document, link)
+            hulls = [_hull(*each[:2], each.mesh_file, frame, pose @ each.pose) for each in shapes]
+        except (ValueError, OSError) as error:
+            raise ConfigError([Problem(robot.urdf_path, f"link '{link}'", str(error))]) from None
+        if hulls:
+            found[link] = hulls
+    return found
+
+
+def hull_of(obstacle: Obstacle) -> Hull:
+    """Returns the shape of an obstacle.
+
+    Raises:
+        ValueError: If the obstacle is flat, or its mesh cannot be read.
+    """
+    pose = matrix_of(*obstacle.pose)
+    return _hull(obstacle.kind, obstacle.link_size, obstacle.mesh_file, 0, pose, obstacle.corners)
 
 
 def _hull(

@@ -21,6 +21,7 @@ SCENES: PluginTable[Scene] = PluginTable(
         "talos": "rpbi_examples.scenes.talos:Talos",
         "factory": "rpbi_examples.scenes.factory:Factory",
         "dual_arm": "rpbi_examples.scenes.dual_arm:DualArm",
+        "shelves": "rpbi_examples.scenes.shelves:Shelves",
     },
 )
 """All scenes. A scene's module is imported on look-up, since some scenes need optional dependencies."""

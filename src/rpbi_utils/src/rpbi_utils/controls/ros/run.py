@@ -1,4 +1,4 @@
-"""Panels that start, stop and step the world or a model predictive controller."""
+"""Panels that start, stop and step the world or a model predictive controller, and a panel for planned motions."""
 
 from functools import partial
 from typing import Any
@@ -163,3 +163,32 @@ class MpcPanel(Panel):
 
     def _call(self, name: str, service: str, _: Any = None) -> None:
         self.ask(name, lambda: RunningSimulator().call(service, Trigger).message)
+
+
+PLANNER_BUTTONS = {
+    "Plan": ("planner/plan_to_frame", "Plans a motion to the goal that is dragged in RViz, and shows it"),
+    "Move": ("planner/move", "Executes the shown motion"),
+    "Stop": ("planner/stop", "Stops planning and moving"),
+}
+"""Title, service and tool tip of each button."""
+PLANNER_LIMIT_S = 600.0
+
+
+class PlannerPanel(Panel):
+    """Plans a motion to the dragged goal, and executes it. The panel is hidden unless a planner offers its services."""
+
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
+        super().__init__("Motion planning", link, requests)
+        row = QHBoxLayout(self)
+        for title, (service, tip) in PLANNER_BUTTONS.items():
+            button = named(QPushButton(title), f"planner_{title.lower()}", tip)
+            button.clicked.connect(partial(self._call, title, service))
+            self.require(service, button)
+            row.addWidget(button)
+
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
+        super().refresh(snapshot)
+        self.setVisible(snapshot.has("planner/plan_to_frame"))
+
+    def _call(self, name: str, service: str, _: Any = None) -> None:
+        self.ask(name, lambda: RunningSimulator().call(service, Trigger).message, limit_s=PLANNER_LIMIT_S)

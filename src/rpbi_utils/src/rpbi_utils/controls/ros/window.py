@@ -12,7 +12,7 @@ from .link import SimulatorLink
 from .objects import ObjectsPanel
 from .panel import Panel, ScrolledDown, named
 from .recording import RecordingPanel
-from .run import MpcPanel, RunPanel
+from .run import MpcPanel, PlannerPanel, RunPanel
 
 TITLE = "ROS-PyBullet Interface Controls"
 REFRESH_MS = 100
@@ -48,7 +48,12 @@ class ControlsWindow(QMainWindow):
         self._link = link
         requests = BackgroundRequests(signals.answered.emit)
         signals.answered.connect(self._on_answer)
-        left: list[Panel] = [RunPanel(link, requests), MpcPanel(link, requests), JointsPanel(link, requests, first)]
+        left: list[Panel] = [
+            RunPanel(link, requests),
+            MpcPanel(link, requests),
+            PlannerPanel(link, requests),
+            JointsPanel(link, requests, first),
+        ]
         right: list[Panel] = [
             ObjectsPanel(link, requests),
             CamerasPanel(link, requests),
@@ -108,5 +113,5 @@ def _column(panels: list[Panel]) -> QWidget:
     column = QWidget()
     layout = QVBoxLayout(column)
     for panel in panels:
-        layout.addWidget(panel, 0 if isinstance(panel, RunPanel | MpcPanel | RecordingPanel) else 1)
+        layout.addWidget(panel, 0 if isinstance(panel, RunPanel | MpcPanel | PlannerPanel | RecordingPanel) else 1)
     return ScrolledDown(column)

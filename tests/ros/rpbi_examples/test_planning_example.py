@@ -1,0 +1,41 @@
+"""`planning_example.launch`, from its start until all boxes are in the other bookcase."""
+
+from __future__ import annotations
+
+import pytest
+import rospy
+import tf2_ros
+from node_world import Rosout
+from real_robot import RealRobot
+from ros_system import RosSystem, wait_until
+
+from rpbi_examples.shelving import LEFT, RIGHT
+
+pytestmark = pytest.mark.thorough
+BOXES = ("box_1", "box_2", "box_3")
+SLOW_S = 500.0
+
+
+def bookcase_of(buffer: tf2_ros.Buffer, box: str) -> str:
+    """Returns the name of the bookcase in which a box is, empty if in none; nothing but the boards carries it there."""
+    place = buffer.lookup_transform("rpbi/world", f"rpbi/{box}", rospy.Time(0)).transform.translation
+    return next((each.name for each in (LEFT, RIGHT) if each.has((place.x, place.y, place.z))), "")
+
+
+def test_all_boxes_come_into_the_other_bookcase(ros: RosSystem) -> None:
+    buffer = ros.listen_to_tf()
+    process = ros.start(["roslaunch", "rpbi_examples", "planning_example.launch", "headless:=true", "rounds:=1"])
+    wait_until(lambda: buffer.can_transform("rpbi/world", "rpbi/box_3", rospy.Time(0)), "there are boxes")
+    assert {bookcase_of(buffer, box) for box in BOXES} == {LEFT.name}
+    wait_until(lambda: process.poll() is not None, "the round has ended", SLOW_S)
+    output = ros.output(process)
+    assert {bookcase_of(buffer, box) for box in BOXES} == {RIGHT.name}, output
+    assert "all boxes are carried" in output
+
+
+def test_a_real_robot_follows_the_planned_motions(ros: RosSystem) -> None:
+    real, rosout = RealRobot(ros), Rosout(ros)
+    ros.start(["roslaunch", "rpbi_examples", "planning_example.launch", "headless:=true", "real_robot:=true"])
+    real.wait_until_moved()
+    rosout.wait_for(["box_1 is in 'right_shelf'"], SLOW_S)
+    assert real.has_moved and not rosout.logs("halted")
