@@ -4,6 +4,7 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff, Position, PositiveKilograms, Quat
+from rpbi.config.contact_presets import WithContactPreset
 from rpbi.config.pybullet_models import (
     ChangeDynamics,
     CreateCollisionShape,
@@ -22,7 +23,7 @@ from .body_config import BodyConfig
 from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
-class DynamicObjectConfig(BodyConfig):
+class DynamicObjectConfig(WithContactPreset, BodyConfig):
     """A dynamic object, which physics moves."""
 
     createVisualShape: CreateVisualShape = Field(description="Visual shape of the object.")
@@ -33,6 +34,9 @@ class DynamicObjectConfig(BodyConfig):
     baseMass: PositiveKilograms = Field(description="Mass of the object.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position in the world.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation in the world, x, y, z, w.")
+    baseInertialFramePosition: Position = Field(
+        (0.0, 0.0, 0.0), description="Centre of mass in the object's frame; not with `useMaximalCoordinates`."
+    )
     useMaximalCoordinates: MaximalCoordinates = False
     convexDecomposition: Decomposition = None
     resetBaseVelocity: ResetBaseVelocity | None = Field(
@@ -71,6 +75,9 @@ class DynamicObject(ShapeObject):
         if config.useMaximalCoordinates and pb.is_deformable:
             message = "soft bodies have no contacts with bodies in maximal coordinates; remove it in a deformable world"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
+        if config.useMaximalCoordinates and any(config.baseInertialFramePosition):
+            message = "the centre of mass of a body in maximal coordinates is its origin; remove one of the two"
+            raise ConfigError([Problem(config.name, "baseInertialFramePosition", message)])
         if config.useMaximalCoordinates and config.tracked_tf is not None:
             message = "a body in maximal coordinates cannot follow TF; remove one of the two"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
@@ -84,6 +91,7 @@ class DynamicObject(ShapeObject):
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,
             useMaximalCoordinates=config.useMaximalCoordinates,
+            **({"baseInertialFramePosition": config.baseInertialFramePosition} if any(config.baseInertialFramePosition) else {}),
         )
         if config.changeDynamics is not None:
             self.change_dynamics(-1, **config.changeDynamics.kwargs())

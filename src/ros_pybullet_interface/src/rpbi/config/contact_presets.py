@@ -1,0 +1,67 @@
+"""Named contact settings that were identified from measured motion, see docs/reality.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from custom_ros_tools.errors import hint
+from custom_ros_tools.schema import ConfigModel, KeyedError, Text
+
+
+class ContactPreset(NamedTuple):
+    """Contact settings of a named preset.
+
+    Attributes:
+        body: Keys of `changeDynamics` of the moving body. The other body has friction and restitution 1.
+        world: Keys of the main file.
+    """
+
+    body: Mapping[str, Any]
+    world: Mapping[str, Any]
+
+
+CONTACT_PRESETS: dict[str, ContactPreset] = {
+    "impact": ContactPreset(
+        {
+            "lateralFriction": 0.173,
+            "restitution": 0.106,
+            "contactStiffness": 13400.0,
+            "contactDamping": 52.0,
+            "linearDamping": 0.0,
+            "angularDamping": 0.0,
+        },
+        {"timeStep": 0.00168918919},
+    ),
+    "pushing": ContactPreset({"lateralFriction": 0.5, "restitution": 0.0}, {"timeStep": 0.004}),
+}
+"""Presets, indexed by name. A body's own keys, and those of a main file, replace the preset's keys."""
+
+
+class WithContactPreset(ConfigModel):
+    """Base class of models with the key `contact_preset`; the preset's values are defaults of other keys."""
+
+    contact_preset: Text | None = Field(
+        None,
+        description="Named contact settings that were identified from measured motion: "
+        f"{' or '.join(f'`{name}`' for name in CONTACT_PRESETS)}; see docs/reality.md. Other keys of this file replace "
+        "values of the preset. By default, no preset.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_preset(cls, data: Any, info: ValidationInfo) -> Any:
+        name = data.get("contact_preset") if isinstance(data, Mapping) else None
+        if not isinstance(name, str) or not name:
+            return data
+        if name not in CONTACT_PRESETS:
+            raise KeyedError("contact_preset", f"there is no preset '{name}'{hint(name, CONTACT_PRESETS)}")
+        preset = CONTACT_PRESETS[name]
+        if "changeDynamics" not in cls.model_fields:
+            return {**preset.world, **data}
+        given = data.get("changeDynamics")
+        if given is not None and not isinstance(given, Mapping):
+            return data  # the field's own type reports the error
+        return {**data, "changeDynamics": {**preset.body, **(given or {})}}
