@@ -9,7 +9,10 @@ from typing import Annotated
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
 from rpbi_reality.evaluation import PushResult, TossResult, evaluate_pushes, evaluate_tosses, find_file, find_urdf
+from rpbi_reality.page import write_page
+from rpbi_reality.pictures import write_pictures
 from rpbi_reality.report import push_table, toss_table, write_json
+from rpbi_reality.tosses.convert_tosses import convert_tosses
 
 
 def reality(
@@ -19,6 +22,7 @@ def reality(
     out: Annotated[Path, Argument("FOLDER", parse=Path, files="*")] = Path("out/reality"),
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*.json")] = None,
     no_pictures: Annotated[bool, Argument("")] = False,
+    convert: Annotated[Path | None, Argument("REPOSITORY", parse=Path, files="*")] = None,
 ) -> int:
     """Simulates published experiments with real contacts, and prints how far the simulation is from the measurements.
 
@@ -34,7 +38,13 @@ def reality(
         out: folder for pictures and page; default out/reality
         json: file for the tables; default FOLDER/reality.json
         no_pictures: writes neither pictures nor page
+        convert: a clone of the repository with the published tosses; writes cube_tosses.npz to the folder of the data,
+            and ends
     """
+    if convert is not None:
+        count = convert_tosses(convert, data / "cube_tosses.npz")
+        print(f"{data / 'cube_tosses.npz'}: {count} tosses")
+        return 0
     if not data.is_dir():
         raise UsageError(f"--data: there is no folder {data}; docs/reality.md says what to download")
     problems: list[str] = []
@@ -62,6 +72,10 @@ def reality(
     results = json or out / "reality.json"
     write_json(results, tosses, pushes, problems)
     print(results)
+    if not no_pictures and (tosses is not None or pushes):
+        print(*map(str, write_pictures(out, tosses, pushes)), sep="\n")
+        write_page(out / "reality.html", tosses, pushes)
+        print(out / "reality.html")
     for problem in problems:
         print(problem, file=sys.stderr)
     return int(bool(problems))
