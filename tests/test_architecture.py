@@ -30,6 +30,7 @@ MODULES = {
     "episodes": "episodes",
     "motion_primitives": "motion_primitives",
     "rpbi_mpc": "rpbi_mpc",
+    "rpbi_reality": "rpbi_reality",
     "rpbi_examples": "rpbi_examples",
 }
 """Python module of each package."""
@@ -45,6 +46,7 @@ ALLOWED = {
     "rpbi_ros2": {"custom_ros_tools", "ros_pybullet_interface", "rpbi_data", "rpbi_utils"},
     "motion_primitives": {"custom_ros_tools", "robot_model", "rpbi_data"},
     "rpbi_mpc": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
+    "rpbi_reality": {"custom_ros_tools", "robot_model", "ros_pybullet_interface", "rpbi_data"},
     "episodes": {"custom_ros_tools", "rpbi_data"},
     "rpbi_examples": MODULES.keys() - {"rpbi_examples"},
 }
@@ -74,6 +76,7 @@ BY_FEATURE = {
     "rpbi_data",
     "rpbi_examples",
     "rpbi_mpc",
+    "rpbi_reality",
     "rpbi_ros2",
     "rpbi_utils",
     "safe_robot",

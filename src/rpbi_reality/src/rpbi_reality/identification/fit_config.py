@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from typing_extensions import Self
 
-from custom_ros_tools.schema import ConfigModel, Count, KeyedError, ListOf, OneAsList, Positive, Seconds, Text, Unit
+from custom_ros_tools.schema import (
+    AlsoTakes,
+    ConfigModel,
+    Count,
+    Expects,
+    KeyedError,
+    ListOf,
+    Positive,
+    Seconds,
+    Text,
+    Unit,
+)
 
 PATH = re.compile(r"(world|measured|inputs|dynamics|[A-Za-z0-9_]+)(\.[A-Za-z0-9_/\[\]]+)+")
 
@@ -20,8 +31,17 @@ def _path(text: str) -> str:
     return text
 
 
+def _as_list(given: Any) -> Any:
+    return [given] if isinstance(given, str) else given
+
+
 Bounds = Annotated[tuple[float, float], Field(strict=False)]
-Paths = Annotated[ListOf[Annotated[Text, AfterValidator(_path)]], OneAsList]
+Paths = Annotated[
+    ListOf[Annotated[Text, AfterValidator(_path)]],
+    BeforeValidator(_as_list),
+    AlsoTakes({"type": "string"}),
+    Expects("a key or a list of keys"),
+]
 
 
 class ParameterConfig(ConfigModel):

@@ -15,6 +15,10 @@ from custom_ros_tools.schema import ConfigModel, Hz, ListOf, NonNegative, Positi
 from rpbi.control.controllers.controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState, SetPoints
 
 Degrees = Annotated[float, Unit("deg")]
+GRAVITY_S = 0.1
+"""Interval [s] at which the torques of gravity are computed."""
+MAX_DEVIATION = 0.05
+"""Largest angle [rad] between a joint and the integral of its velocity, for instance when the arm is blocked."""
 Delay = Annotated[NonNegative, Field(le=2.0), Unit("s")]
 
 
@@ -45,7 +49,8 @@ class VelocityServoConfig(ControllerConfig):
 class VelocityServo(Controller):
     """Commands joint velocities at a fixed rate: a gain times the error, within a limit.
 
-    The velocity follows the command after a delay, as a first-order lag.
+    The velocity follows the command after a delay, as a first-order lag. PyBullet's motors keep the joints at the
+    integral of this velocity, from which they deviate by at most `MAX_DEVIATION`.
     """
 
     Config = VelocityServoConfig
@@ -67,25 +72,33 @@ class VelocityServo(Controller):
     def start(self, state: RobotState, tick: int) -> None:
         """Starts with velocity 0."""
         zero = np.zeros(len(self._places))
-        self._velocity, self._command = zero, zero
+        self._velocity, self._command, self._torques, self._next_gravity = zero, zero, zero, tick
+        self._position = np.array(state.position)[self.arm.chosen]
         self._commands = deque([zero] * (self._late + 2), self._late + 2)
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array | SetPoints:
         """Returns the positions at the end of the tick."""
-        position = np.array(state.position)[self.arm.chosen]
+        measured = np.array(state.position)[self.arm.chosen]
+        position = np.clip(self._position, measured - MAX_DEVIATION, measured + MAX_DEVIATION)
         if tick % self._every == 0:
             limit = math.radians(self.config.limit_deg_per_s)
             wanted = self._targets(tick * self.arm.dt_s - self.config.start_s) + self._offset
             if self._droop.any():
-                still = (0.0,) * len(state.position)
-                wanted = wanted - self._droop * self.arm.of_chosen(
-                    self.arm.model.bias(state.base, state.position, still)
-                )
+                wanted = wanted - self._droop * self._gravity(state, tick)
             self._command = np.clip(self.config.gain_per_s * (wanted - position), -limit, limit)
         self._commands.append(self._command)
         delayed = (1.0 - self._fraction) * self._commands[1] + self._fraction * self._commands[0]
         self._velocity = self._velocity + self._decay * (delayed - self._velocity)
-        return SetPoints(position + self._velocity * self.arm.dt_s)
+        self._position = position + self._velocity * self.arm.dt_s
+        return SetPoints(self._position)
+
+    def _gravity(self, state: RobotState, tick: int) -> np.ndarray:
+        """Returns the torques [N m] that hold the arm against gravity, at most `GRAVITY_S` old, shape (m,)."""
+        if tick >= self._next_gravity:
+            still = (0.0,) * len(state.position)
+            self._torques = self.arm.of_chosen(self.arm.model.bias(state.base, state.position, still))
+            self._next_gravity = tick + max(1, round(GRAVITY_S / self.arm.dt_s))
+        return self._torques
 
     def _targets(self, time_s: float) -> np.ndarray:
         """Returns the scheduled targets [rad] at a time, shape (m,)."""
