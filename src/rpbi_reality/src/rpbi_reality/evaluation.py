@@ -25,7 +25,10 @@ TOSS_WORLDS = {
     "PyBullet, measured lengths, gravity and centre of mass": "tosses/measured.yaml",
 }
 """World of each row of the table of tosses; the first row has pictures."""
-PUSH_WORLDS = {"PyBullet, identified": "pushes/identified_{}.yaml", "PyBullet, published facts": "pushes/experiment_{}.yaml"}
+PUSH_WORLDS = {
+    "PyBullet, identified": "pushes/identified_{}.yaml",
+    "PyBullet, published facts": "pushes/experiment_{}.yaml",
+}
 """Worlds of each row of the table of pushes, with a place for the experiment's number; the first row has pictures."""
 REALITY = "real runs, each against the others"
 DIVERGED = 1e4
@@ -67,7 +70,9 @@ def find_file(folder: Path, stem: str) -> Path | None:
         return exact
     found = sorted(path for path in folder.glob(f"{stem}_*.npz") if not path.stem.endswith("_simulators"))
     if len(found) > 1:
-        raise ConfigError([Problem(str(folder), "", f"expected one file {stem}*.npz, got {', '.join(p.name for p in found)}")])
+        raise ConfigError(
+            [Problem(str(folder), "", f"expected one file {stem}*.npz, got {', '.join(p.name for p in found)}")]
+        )
     return found[0] if found else None
 
 
@@ -167,4 +172,3 @@ def _push_row(name: str, errors: PushErrors) -> Row:
 def as_numbers(row: Row) -> dict[str, Any]:
     """Returns the cells of a row for JSON: mean, low and high of each interval."""
     return {key: each._asdict() if isinstance(each, Interval) else each for key, each in row.cells.items()}
-

@@ -81,7 +81,10 @@ for (const scene of scenes) {
   };
   slider.oninput = () => { playing = false; button.textContent = "Play"; show(); };
   canvas.onpointermove = event => {
-    if (event.buttons) { yaw -= event.movementX * .01; pitch = Math.max(0, Math.min(1.5, pitch + event.movementY * .01)); show(); }
+    if (!event.buttons) return;
+    yaw -= event.movementX * .01;
+    pitch = Math.max(0, Math.min(1.5, pitch + event.movementY * .01));
+    show();
   };
   show();
 }
@@ -90,7 +93,8 @@ for (const scene of scenes) {
 
 def write_page(path: Path, tosses: TossResult | None, pushes: list[PushResult]) -> None:
     """Writes the page, which needs no other file and no network."""
-    scenes, sections = [], []
+    scenes: list[dict[str, Any]] = []
+    sections = []
     for scene, title in _scenes(tosses, pushes):
         scene["id"] = f"scene{len(scenes)}"
         scenes.append(scene)
@@ -111,7 +115,10 @@ def _scenes(tosses: TossResult | None, pushes: list[PushResult]) -> list[tuple[d
         for name, index in chosen_tosses(tosses).items():
             toss = tosses.data.tosses[index]
             real = np.hstack([toss.position, toss.quaternion])
-            tracks = {"real": (real, tosses.data.side), "simulated": (np.hstack(tosses.simulated(index)), tosses.data.side)}
+            tracks = {
+                "real": (real, tosses.data.side),
+                "simulated": (np.hstack(tosses.simulated(index)), tosses.data.side),
+            }
             along = toss.position[-1] - toss.position[0]
             yaw = float(np.arctan2(along[1], along[0]))
             scene = _scene(tracks, 1.0 / tosses.data.frame_rate, 0.25, 0.0, yaw)
@@ -126,7 +133,10 @@ def _scenes(tosses: TossResult | None, pushes: list[PushResult]) -> list[tuple[d
 
 def _arm(name: str, poses: PushPoses) -> dict[str, tuple[np.ndarray, float]]:
     hand = np.hstack([poses.hand_position, poses.hand_quaternion])
-    return {f"{name} hand": (hand, 0.05), f"{name} cube": (np.hstack([poses.cube_position, poses.cube_quaternion]), 0.075)}
+    return {
+        f"{name} hand": (hand, 0.05),
+        f"{name} cube": (np.hstack([poses.cube_position, poses.cube_quaternion]), 0.075),
+    }
 
 
 def _scene(

@@ -68,7 +68,9 @@ def toss_figure(result: TossResult) -> Figure:
     return figure
 
 
-def _outline(axes: object, along: np.ndarray, position: np.ndarray, quaternion: np.ndarray, side: float, color: str) -> None:
+def _outline(
+    axes: object, along: np.ndarray, position: np.ndarray, quaternion: np.ndarray, side: float, color: str
+) -> None:
     """Draws the edges of a cube, projected on the vertical plane through the direction `along`."""
     corners = Rotation.from_quat(quaternion).apply(_CORNERS * side) + position
     flat = np.stack([corners[:, :2] @ along, corners[:, 2]], 1)

@@ -91,7 +91,11 @@ class DynamicObject(ShapeObject):
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,
             useMaximalCoordinates=config.useMaximalCoordinates,
-            **({"baseInertialFramePosition": config.baseInertialFramePosition} if any(config.baseInertialFramePosition) else {}),
+            **(
+                {"baseInertialFramePosition": config.baseInertialFramePosition}
+                if any(config.baseInertialFramePosition)
+                else {}
+            ),
         )
         if config.changeDynamics is not None:
             self.change_dynamics(-1, **config.changeDynamics.kwargs())

@@ -166,7 +166,7 @@ def _with_list(overrides: Mapping[str, Any], file: Mapping[str, Any], steps: Seq
     result: dict[str, Any] = copy.deepcopy(dict(overrides))
     inner = result
     for step in steps[: first - 1]:
-        inner = inner.setdefault(step, {})
+        inner = inner.setdefault(str(step), {})
     inner[str(steps[first - 1])] = list(below)
     return result
 

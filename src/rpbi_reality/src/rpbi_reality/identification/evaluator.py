@@ -69,11 +69,11 @@ def _of_runs(template: WorldTemplate, values: Mapping[str, float], runs: Sequenc
     try:
         for run in runs:
             try:
-                error, row = _of_run(config, world, run)
-            except (InterfaceError, ValueError) as problem:
-                problems.append(f"run {run.name}: {problem}")
-                error, row = DIVERGED, _far(config, run)
-            errors.append(error)
+                cost, row = _of_run(config, world, run)
+            except (InterfaceError, ValueError) as failure:
+                problems.append(f"run {run.name}: {failure}")
+                cost, row = DIVERGED, _far(config, run)
+            errors.append(cost)
             rows.append(row)
     finally:
         world.close()

@@ -57,7 +57,9 @@ class ParameterConfig(ConfigModel):
     prior: Annotated[tuple[float, Positive], Field(strict=False)] | None = Field(
         None, description="Mean and standard deviation of what is known beforehand. By default, nothing is known."
     )
-    scale: Literal["linear", "log"] = Field("linear", description="Whether the search varies the value or its logarithm.")
+    scale: Literal["linear", "log"] = Field(
+        "linear", description="Whether the search varies the value or its logarithm."
+    )
 
     @model_validator(mode="after")
     def _bounds_are_ordered(self) -> Self:
@@ -114,8 +116,8 @@ class FitConfig(ConfigModel):
     )
     objective: Literal["squares", "mean_error"] = Field(
         "squares",
-        description="`squares`: robust sum of squares of errors divided by their standard deviations. `mean_error`: mean "
-        "distance and angle over time, divided by their standard deviations; only for `cmaes`.",
+        description="`squares`: robust sum of squares of errors, divided by their standard deviations. `mean_error`: "
+        "mean distance and angle over time, divided by their standard deviations; only for `cmaes`.",
     )
     seed: Count = Field(0, description="Seed of the search and of the bootstrap.")
     evaluations: Annotated[Count, Field(ge=10)] = Field(400, description="Largest number of simulated candidates.")

@@ -78,7 +78,9 @@ def chosen_runs(config: FitConfig, runs: list[Recording], file: str) -> tuple[li
     else:
         count = config.runs.count or max(1, math.ceil(0.75 * len(runs)))
         if count > len(runs):
-            raise ConfigError([Problem(file, "runs.count", f"expected at most {len(runs)}, the number of runs; got {count}")])
+            raise ConfigError(
+                [Problem(file, "runs.count", f"expected at most {len(runs)}, the number of runs; got {count}")]
+            )
         trained = sorted(np.random.default_rng(config.runs.seed).permutation(len(runs))[:count].tolist())
     return trained, [index for index in range(len(runs)) if index not in set(trained)]
 
@@ -170,6 +172,7 @@ def write_results(folder: Path, world: str, config: FitConfig, result: Identifie
     Returns:
         The written files.
     """
+
     def rounded(number: float) -> float:
         return float(f"{number:.{DIGITS}g}")
 
@@ -189,7 +192,8 @@ def write_results(folder: Path, world: str, config: FitConfig, result: Identifie
         },
         "cannot_be_told_apart": [list(group) for group in result.uncertainty.alike],
         "profiles": {
-            name: [[rounded(each) for each in pair] for pair in rows] for name, rows in result.uncertainty.profiles.items()
+            name: [[rounded(each) for each in pair] for pair in rows]
+            for name, rows in result.uncertainty.profiles.items()
         },
         "identified_from": result.trained,
         "held_out": result.held_out,
@@ -240,4 +244,3 @@ def summary(result: Identified) -> str:
         lines.append(f"{kind}: {', '.join(group)}")
     lines += [f"{count} candidates: {problem}" for problem, count in result.problems.items()]
     return "\n".join(lines)
-

@@ -21,7 +21,9 @@ def parameter_picture(config: FitConfig, values: Mapping[str, float], found: Unc
         place = (value - low) / (high - low)
         axes.plot(interval, [row, row], color="tab:blue", linewidth=5, alpha=0.4, solid_capstyle="butt")
         axes.plot([place], [row], "o", color="tab:blue")
-        axes.text(1.02, row, f"{value:.4g}  [{found.intervals[name][0]:.4g}, {found.intervals[name][1]:.4g}]", va="center")
+        axes.text(
+            1.02, row, f"{value:.4g}  [{found.intervals[name][0]:.4g}, {found.intervals[name][1]:.4g}]", va="center"
+        )
         axes.text(-0.02, row, name, ha="right", va="center")
     axes.set(xlim=(0, 1), ylim=(-0.7, len(values) - 0.3), yticks=[], xlabel="value within the bounds, 95 % interval")
     axes.grid(axis="x", alpha=0.3)

@@ -81,7 +81,8 @@ class Recording(NamedTuple):
     @property
     def end_s(self) -> float:
         """Time of the last measurement [s]."""
-        return max(float(track.time[-1]) for track in (*self.poses.values(), *self.joints.values()))
+        tracks: list[PoseTrack | JointTrack] = [*self.poses.values(), *self.joints.values()]
+        return max(float(track.time[-1]) for track in tracks)
 
 
 def check(file: str, run: Recording) -> None:
@@ -101,7 +102,9 @@ def check(file: str, run: Recording) -> None:
             raise ConfigError([Problem(file, key, "contains numbers that are not finite")])
         if (steps <= 0.0).any():
             at = float(track.time[int(np.argmax(steps <= 0.0))])
-            raise ConfigError([Problem(file, key, f"expected increasing times, but time does not increase after {at:g} s")])
+            raise ConfigError(
+                [Problem(file, key, f"expected increasing times, but time does not increase after {at:g} s")]
+            )
         if name not in run.inputs and steps.max() > MAX_JUMP * np.median(steps):
             at = float(track.time[int(steps.argmax())])
             message = f"expected steady stamps, but they jump by {steps.max():.3g} s after {at:g} s"
@@ -114,7 +117,9 @@ def check(file: str, run: Recording) -> None:
     for slot, each in run.inputs.items():
         begin, end = max(begin, float(each.time[0])), min(end, float(each.time[-1]) + 1.0)
         if begin >= end:
-            raise ConfigError([Problem(file, f"{slot} of run {run.name}", "does not overlap in time with the measurements")])
+            raise ConfigError(
+                [Problem(file, f"{slot} of run {run.name}", "does not overlap in time with the measurements")]
+            )
     if begin >= end:
         raise ConfigError([Problem(file, f"run {run.name}", "signals do not overlap in time")])
 

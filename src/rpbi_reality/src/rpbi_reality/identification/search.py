@@ -144,8 +144,15 @@ def _least_squares(
 
     most = max(3, config.evaluations // (2 * count + 1))
     solved = least_squares(
-        rows, np.clip(space.first, 1e-3, 1.0 - 1e-3), jacobian, (0.0, 1.0), loss="soft_l1", f_scale=0.5, max_nfev=most,
-        xtol=1e-5, ftol=1e-5,
+        rows,
+        np.clip(space.first, 1e-3, 1.0 - 1e-3),
+        jacobian,
+        (0.0, 1.0),
+        loss="soft_l1",
+        f_scale=0.5,
+        max_nfev=most,
+        xtol=1e-5,
+        ftol=1e-5,
     )
     rows(solved.x)
     jacobian(solved.x)

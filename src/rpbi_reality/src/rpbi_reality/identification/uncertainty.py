@@ -132,7 +132,9 @@ def _profile(space: Space, unit: np.ndarray, hessian: np.ndarray, index: int) ->
     for shift in np.linspace(-0.2, 0.2, 9):
         place = unit.copy()
         place[index] = np.clip(unit[index] + shift, 0.0, 1.0)
-        rows.append((space.values(place)[space.names[index]], float(max(curvature, 0.0) * (place[index] - unit[index]) ** 2)))
+        rows.append(
+            (space.values(place)[space.names[index]], float(max(curvature, 0.0) * (place[index] - unit[index]) ** 2))
+        )
     return rows
 
 

@@ -12,7 +12,14 @@ from pydantic import Field
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import ConfigModel, Hz, ListOf, NonNegative, Positive, Unit
-from rpbi.control.controllers.controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState, SetPoints
+from rpbi.control.controllers.controller import (
+    Array,
+    ControlledRobot,
+    Controller,
+    ControllerConfig,
+    RobotState,
+    SetPoints,
+)
 
 Degrees = Annotated[float, Unit("deg")]
 GRAVITY_S = 0.1

@@ -76,12 +76,14 @@ class MujocoCube:
         self._ticks = ticks
         self._model = mujoco.MjModel.from_xml_string(
             f"""<mujoco>
-            <option timestep="{1.0 / frame_rate / ticks}" gravity="0 0 {-settings.gravity}" cone="elliptic" impratio="10"/>
+            <option timestep="{1.0 / frame_rate / ticks}" gravity="0 0 {-settings.gravity}"
+              cone="elliptic" impratio="10"/>
             <worldbody>
               <geom type="plane" size="5 5 0.1" {contact}/>
               <body>
                 <freejoint/>
-                <inertial pos="{_words(settings.centre)}" mass="{settings.mass}" diaginertia="{_words(settings.inertia)}"/>
+                <inertial pos="{_words(settings.centre)}" mass="{settings.mass}"
+                  diaginertia="{_words(settings.inertia)}"/>
                 <geom type="box" size="{half} {half} {half}" {contact}/>
               </body>
             </worldbody>
