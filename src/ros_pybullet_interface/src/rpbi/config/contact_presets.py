@@ -35,7 +35,11 @@ CONTACT_PRESETS: dict[str, ContactPreset] = {
         },
         {"timeStep": 0.00168918919},
     ),
-    "pushing": ContactPreset({"lateralFriction": 0.5, "restitution": 0.0}, {"timeStep": 0.004}),
+    "bounce": ContactPreset(
+        {"linearDamping": 0.0, "angularDamping": 0.0},
+        {"timeStep": 0.001, "setPhysicsEngineParameter": {"contactERP": 0.0}},
+    ),
+    "pushing": ContactPreset({"lateralFriction": 0.19, "restitution": 0.0}, {"timeStep": 0.004}),
 }
 """Presets, indexed by name. A body's own keys, and those of a main file, replace the preset's keys."""
 
@@ -46,7 +50,7 @@ class WithContactPreset(ConfigModel):
     contact_preset: Text | None = Field(
         None,
         description="Named contact settings that were identified from measured motion: "
-        f"{' or '.join(f'`{name}`' for name in CONTACT_PRESETS)}; see docs/reality.md. Other keys of this file replace "
+        f"{', '.join(f'`{name}`' for name in CONTACT_PRESETS)}; see docs/reality.md. Other keys of this file replace "
         "values of the preset. By default, no preset.",
     )
 
@@ -60,8 +64,17 @@ class WithContactPreset(ConfigModel):
             raise KeyedError("contact_preset", f"there is no preset '{name}'{hint(name, CONTACT_PRESETS)}")
         preset = CONTACT_PRESETS[name]
         if "changeDynamics" not in cls.model_fields:
-            return {**preset.world, **data}
-        given = data.get("changeDynamics")
-        if given is not None and not isinstance(given, Mapping):
-            return data  # the field's own type reports the error
-        return {**data, "changeDynamics": {**preset.body, **(given or {})}}
+            return _completed(data, preset.world)
+        return _completed(data, {"changeDynamics": preset.body})
+
+
+def _completed(data: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """Adds missing keys, also to inner mappings; null counts as missing."""
+    result = dict(data)
+    for key, default in defaults.items():
+        given = result.get(key)
+        if given is None:
+            result[key] = dict(default) if isinstance(default, Mapping) else default
+        elif isinstance(given, Mapping) and isinstance(default, Mapping):
+            result[key] = _completed(given, default)
+    return result

@@ -259,14 +259,14 @@ class CandidateWorld:
     def _times(self, run: Recording, signal: str, end_s: float) -> np.ndarray:
         track: PoseTrack | JointTrack | None = run.poses.get(signal) or run.joints.get(signal)
         assert track is not None
-        time = track.time[track.time <= end_s + 1e-9] - self._measured.get(f"{signal}.delay_s", 0.0)
-        return np.maximum(time, 0.0)
+        delay_s = self._measured.get(f"{signal}.delay_s", 0.0) - self._config.start_s
+        return np.maximum(track.time[track.time <= end_s + 1e-9] - delay_s, 0.0)
 
     def _inputs(self, run: Recording) -> list[tuple[int, str, dict[str, float]]]:
         """Returns tick, slot and target of each input of a run, in the order of the ticks; unchanged ones only once."""
         found = []
         for slot, track in run.inputs.items():
-            delay_s, last = self._delays.get(f"{slot}.delay_s", 0.0), None
+            delay_s, last = self._config.start_s + self._delays.get(f"{slot}.delay_s", 0.0), None
             for time_s, row in zip(track.time, track.position):
                 target = dict(zip(track.names, row.tolist()))
                 if target != last:

@@ -16,6 +16,7 @@ from custom_ros_tools.schema import (
     Expects,
     KeyedError,
     ListOf,
+    NonNegative,
     Positive,
     Seconds,
     Text,
@@ -122,6 +123,9 @@ class FitConfig(ConfigModel):
     seed: Count = Field(0, description="Seed of the search and of the bootstrap.")
     evaluations: Annotated[Count, Field(ge=10)] = Field(400, description="Largest number of simulated candidates.")
     step: Positive = Field(0.2, description="First step of the search, as a fraction of the bounds.")
+    start_s: Annotated[NonNegative, Unit("s")] = Field(
+        0.0, description="Simulated time before a run starts, in which robots come to rest."
+    )
     end_s: Seconds | None = Field(None, description="Time of a run at which the comparison ends. By default, its end.")
 
     @model_validator(mode="after")
