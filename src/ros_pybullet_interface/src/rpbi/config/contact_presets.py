@@ -26,14 +26,14 @@ class ContactPreset(NamedTuple):
 CONTACT_PRESETS: dict[str, ContactPreset] = {
     "impact": ContactPreset(
         {
-            "lateralFriction": 0.173,
-            "restitution": 0.106,
-            "contactStiffness": 13400.0,
-            "contactDamping": 52.0,
+            "lateralFriction": 0.1755,
+            "restitution": 0.105,
+            "contactStiffness": 23800.0,
+            "contactDamping": 75.8,
             "linearDamping": 0.0,
             "angularDamping": 0.0,
         },
-        {"timeStep": 0.00168918919},
+        {"timeStep": 0.000965251},
     ),
     "bounce": ContactPreset(
         {"linearDamping": 0.0, "angularDamping": 0.0},
