@@ -53,10 +53,10 @@ def test_free_flight_is_that_of_the_centre_of_mass():
     world = TossWorld(load_world(world_file("tosses/world.yaml")), 148.0)
     try:
         start = START._replace(position=np.array([0.0, 0.0, 2.0]))
-        position, quaternion = world(start, 20)
+        position, quaternion = world(start, 60)
         centre = np.array(world._cube.baseInertialFramePosition)
-        mass = position + rotated(quaternion, np.tile(centre, (20, 1)))
-        time = np.arange(20) / 148.0
+        mass = position + rotated(quaternion, np.tile(centre, (60, 1)))
+        time = np.arange(60) / 148.0
         assert polyfit(time, mass, 2)[2] == pytest.approx([0.0, 0.0, -9.605 / 2.0], abs=0.02)
         assert _distance_from_parabola(time, mass) < 1e-5 < _distance_from_parabola(time, position)
     finally:

@@ -134,7 +134,7 @@ class Evaluator:
         """Runs the processes during a context."""
         _start(self._job)
         if self._jobs > 1:
-            context = multiprocessing.get_context("spawn")
+            context = multiprocessing.get_context("fork")
             self._pool = ProcessPoolExecutor(self._jobs, context, _start, (self._job,))
         try:
             yield self

@@ -151,8 +151,9 @@ def _least_squares(
         loss="soft_l1",
         f_scale=0.5,
         max_nfev=most,
-        xtol=1e-5,
-        ftol=1e-5,
+        x_scale="jac",
+        xtol=1e-6,
+        ftol=1e-6,
     )
     rows(solved.x)
     jacobian(solved.x)
