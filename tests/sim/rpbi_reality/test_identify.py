@@ -147,7 +147,10 @@ def test_candidates_that_cannot_be_simulated_do_not_end_the_search(world, motion
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"parameters": {"x": {"set": "box.baseMass", "bounds": [2.0, 1.0]}}}, r"bounds: expected \[smallest, largest\]"),
+        (
+            {"parameters": {"x": {"set": "box.baseMass", "bounds": [2.0, 1.0]}}},
+            r"bounds: expected \[smallest, largest\]",
+        ),
         ({"parameters": {"x": {"set": "nothing", "bounds": [0.0, 1.0]}}}, "expected OBJECT.KEY"),
         ({"objective": "mean_error"}, "mean_error is not smooth"),
         ({"parameters": {}}, "parameters: expected at least one"),

@@ -68,11 +68,17 @@ def test_the_command_prints_tables_and_writes_results(tmp_path, capsys):
     write(tmp_path / "arm_pushes.npz", push_arrays())
     assert reality(data=tmp_path, out=tmp_path / "out") == 1
     printed = capsys.readouterr()
-    assert "| PyBullet, preset `impact` |" in printed.out and "| real runs, each against the others | 1.0 [" in printed.out
+    assert (
+        "| PyBullet, preset `impact` |" in printed.out and "| real runs, each against the others | 1.0 [" in printed.out
+    )
     assert "m1n6s300.urdf is missing" in printed.err
     results = json.loads((tmp_path / "out/reality.json").read_text())
     rows = results["tosses"]["rows"]
-    assert results["tosses"]["tosses"] == 2 and set(rows["PyBullet, published facts"]["position"]) == {"mean", "low", "high"}
+    assert results["tosses"]["tosses"] == 2 and set(rows["PyBullet, published facts"]["position"]) == {
+        "mean",
+        "low",
+        "high",
+    }
     assert results["pushes"]["1"]["rows"]["real runs, each against the others"]["hand_mm"]["mean"] == pytest.approx(1.0)
     assert (tmp_path / "out/tosses.png").stat().st_size > 10_000
     page = (tmp_path / "out/reality.html").read_text()

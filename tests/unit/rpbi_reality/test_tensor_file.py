@@ -36,7 +36,9 @@ class _Tensor:
 
 class _Pickler(pickle.Pickler):
     def persistent_id(self, obj):
-        return ("storage", sys.modules["torch"].DoubleStorage, "0", "cpu", 1, None) if isinstance(obj, _Storage) else None
+        return (
+            ("storage", sys.modules["torch"].DoubleStorage, "0", "cpu", 1, None) if isinstance(obj, _Storage) else None
+        )
 
 
 @pytest.fixture

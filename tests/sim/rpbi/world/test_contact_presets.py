@@ -24,7 +24,7 @@ def ball(**keys) -> DynamicObjectConfig:
 
 
 def test_preset_gives_defaults_that_own_keys_replace():
-    preset = CONTACT_PRESETS["impact"].body
+    preset = CONTACT_PRESETS["impact"].body["changeDynamics"]
     dynamics = ball(contact_preset="impact", changeDynamics={"lateralFriction": 0.9}).changeDynamics
     assert dynamics.lateralFriction == 0.9 and dynamics.contactStiffness == preset["contactStiffness"]
     assert ball().changeDynamics is None
@@ -36,7 +36,9 @@ def test_preset_gives_defaults_that_own_keys_replace():
 
 
 def test_unknown_preset_is_refused_with_a_suggestion():
-    with pytest.raises(ConfigError, match="ball.yaml: contact_preset: there is no preset 'impakt'; did you mean 'impact'"):
+    with pytest.raises(
+        ConfigError, match="ball.yaml: contact_preset: there is no preset 'impakt'; did you mean 'impact'"
+    ):
         ball(contact_preset="impakt")
 
 
@@ -75,7 +77,9 @@ def test_body_turns_about_its_centre_of_mass_and_reports_the_pose_of_its_frame()
     try:
         spin = {"angularVelocity": [0.0, 0.0, 2.0]}
         keys = {"changeDynamics": {"angularDamping": 0.0, "linearDamping": 0.0}, "resetBaseVelocity": spin}
-        body = world.add("dynamic", ball(basePosition=[0.0, 0.0, 1.0], baseInertialFramePosition=[0.01, 0.0, 0.0], **keys))
+        body = world.add(
+            "dynamic", ball(basePosition=[0.0, 0.0, 1.0], baseInertialFramePosition=[0.01, 0.0, 0.0], **keys)
+        )
         assert body.base_pose().position == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)
         centres = []
         for _ in range(500):
@@ -93,5 +97,22 @@ def test_centre_of_mass_is_refused_in_maximal_coordinates():
     try:
         with pytest.raises(ConfigError, match="baseInertialFramePosition: the centre of mass"):
             world.add("dynamic", ball(baseInertialFramePosition=[0.01, 0.0, 0.0], useMaximalCoordinates=True))
+    finally:
+        world.close()
+
+
+@pytest.mark.parametrize("keys", [{"contactFriction": {"edge": 0.3, "face": 0.5}}, {}])
+def test_friction_on_faces_differs_from_friction_on_corners(keys):
+    world = _world({"timeStep": 0.001, "setGravity": {"gravZ": -9.81}})
+    world.change_dynamics("floor", {"lateralFriction": 1.0})
+    try:
+        box = {"shapeType": "GEOM_BOX", "halfExtents": [0.05, 0.05, 0.02]}
+        shapes = {"createVisualShape": box, "createCollisionShape": box, "basePosition": [0.0, 0.0, 0.02]}
+        moving = {"resetBaseVelocity": {"linearVelocity": [1.0, 0.0, 0.0]}, "changeDynamics": {"lateralFriction": 0.1}}
+        body = world.add("dynamic", ball(**shapes, **moving, **keys))
+        for _ in range(100):
+            world.step()
+        lost = 1.0 - body.base_twist().linear[0]
+        assert lost == pytest.approx((0.5 if keys else 0.1) * 0.981, rel=0.1)
     finally:
         world.close()

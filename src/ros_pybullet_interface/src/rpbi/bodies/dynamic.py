@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import HzOrOff, Position, PositiveKilograms, Quat
+from custom_ros_tools.schema import ConfigModel, HzOrOff, NonNegative, Position, PositiveKilograms, Quat
 from rpbi.config.contact_presets import WithContactPreset
 from rpbi.config.pybullet_models import (
     ChangeDynamics,
@@ -23,6 +23,13 @@ from .body_config import BodyConfig
 from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
+class ContactFriction(ConfigModel):
+    """Friction that depends on how many contact points share the load, as plastics have it under different pressures."""
+
+    edge: NonNegative = Field(description="Coulomb friction coefficient while the object has two contact points.")
+    face: NonNegative = Field(description="Coulomb friction coefficient while it has three contact points or more.")
+
+
 class DynamicObjectConfig(WithContactPreset, BodyConfig):
     """A dynamic object, which physics moves."""
 
@@ -30,6 +37,11 @@ class DynamicObjectConfig(WithContactPreset, BodyConfig):
     createCollisionShape: CreateCollisionShape = Field(description="Collision shape of the object.")
     changeDynamics: ChangeDynamics | None = Field(
         None, description="Friction, restitution and other dynamics parameters. By default, PyBullet's values."
+    )
+    contactFriction: ContactFriction | None = Field(
+        None,
+        description="Friction on edges and faces; `lateralFriction` is then the friction on a single contact point. By "
+        "default, the friction does not depend on the number of contact points.",
     )
     baseMass: PositiveKilograms = Field(description="Mass of the object.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position in the world.")
@@ -102,6 +114,34 @@ class DynamicObject(ShapeObject):
         self._start_base(config.resetBaseVelocity)
         self._track(config.tracked_tf)
         self.config = config
+        self._corner_friction: float = self.dynamics_info(-1)[1]
+        self._present_friction: float | None = None
+        """Friction that `before_step` has set last; None if it has to be set again."""
+
+    @property
+    def needs_steps(self) -> bool:
+        """Whether the friction depends on the contacts."""
+        return self.config.contactFriction is not None
+
+    def before_step(self, tick: int) -> None:
+        """Sets the friction for the number of contact points after the last tick."""
+        friction = self.config.contactFriction
+        if friction is None:
+            return
+        points = len(self.pb.getContactPoints(self.body_id))
+        wanted = self._corner_friction if points < 2 else friction.edge if points == 2 else friction.face
+        if wanted != self._present_friction:
+            self.pb.changeDynamics(self.body_id, -1, lateralFriction=wanted)
+            self._present_friction = wanted
+
+    def restart(self) -> bool:
+        """Returns whether the body's initial state was restored, see `ShapeObject.restart`."""
+        self._present_friction = None
+        return super().restart()
+
+    def resume(self) -> None:
+        """Has the friction set again in another client."""
+        self._present_friction = None
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Returns the sensors of the object's pose, base state and contacts, each only if it is configured."""

@@ -15,7 +15,7 @@ class ContactPreset(NamedTuple):
     """Contact settings of a named preset.
 
     Attributes:
-        body: Keys of `changeDynamics` of the moving body. The other body has friction and restitution 1.
+        body: Keys of the moving body. The other body has friction and restitution 1.
         world: Keys of the main file.
     """
 
@@ -26,20 +26,23 @@ class ContactPreset(NamedTuple):
 CONTACT_PRESETS: dict[str, ContactPreset] = {
     "impact": ContactPreset(
         {
-            "lateralFriction": 0.1755,
-            "restitution": 0.105,
-            "contactStiffness": 23800.0,
-            "contactDamping": 75.8,
-            "linearDamping": 0.0,
-            "angularDamping": 0.0,
+            "changeDynamics": {
+                "lateralFriction": 0.165,
+                "restitution": 0.11,
+                "contactStiffness": 23000.0,
+                "contactDamping": 70.0,
+                "linearDamping": 0.0,
+                "angularDamping": 0.0,
+            },
+            "contactFriction": {"edge": 0.176, "face": 0.211},
         },
-        {"timeStep": 0.000965251},
+        {"timeStep": 0.00168918919},
     ),
     "bounce": ContactPreset(
-        {"linearDamping": 0.0, "angularDamping": 0.0},
+        {"changeDynamics": {"linearDamping": 0.0, "angularDamping": 0.0}},
         {"timeStep": 0.001, "setPhysicsEngineParameter": {"contactERP": 0.0}},
     ),
-    "pushing": ContactPreset({"lateralFriction": 0.19, "restitution": 0.0}, {"timeStep": 0.004}),
+    "pushing": ContactPreset({"changeDynamics": {"lateralFriction": 0.19, "restitution": 0.0}}, {"timeStep": 0.004}),
 }
 """Presets, indexed by name. A body's own keys, and those of a main file, replace the preset's keys."""
 
@@ -65,7 +68,7 @@ class WithContactPreset(ConfigModel):
         preset = CONTACT_PRESETS[name]
         if "changeDynamics" not in cls.model_fields:
             return _completed(data, preset.world)
-        return _completed(data, {"changeDynamics": preset.body})
+        return _completed(data, preset.body)
 
 
 def _completed(data: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:

@@ -53,7 +53,9 @@ def write_motion(
     try:
         for number in range(runs):
             poses = {signal: PoseTrack(time, *still) for signal in config.measured if signal not in joints}
-            tracks = {signal: JointTrack(time, names, np.zeros((len(time), len(names)))) for signal, names in joints.items()}
+            tracks = {
+                signal: JointTrack(time, names, np.zeros((len(time), len(names)))) for signal, names in joints.items()
+            }
             sent = {slot: JointTrack(time, names, _steps(time, len(names), random)) for slot, names in inputs.items()}
             signals = candidate.simulate(Recording(str(number), poses, tracks, sent), duration_s).signals
             for signal, rows in signals.items():
