@@ -31,6 +31,7 @@ MODULES = {
     "motion_primitives": "motion_primitives",
     "rpbi_mpc": "rpbi_mpc",
     "rpbi_planning": "rpbi_planning",
+    "rpbi_reality": "rpbi_reality",
     "rpbi_examples": "rpbi_examples",
 }
 """Python module of each package."""
@@ -47,6 +48,7 @@ ALLOWED = {
     "motion_primitives": {"custom_ros_tools", "robot_model", "rpbi_data"},
     "rpbi_mpc": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "rpbi_planning": {"custom_ros_tools", "robot_model", "ros_pybullet_interface", "ik_ros", "safe_robot"},
+    "rpbi_reality": {"custom_ros_tools", "robot_model", "ros_pybullet_interface", "rpbi_data"},
     "episodes": {"custom_ros_tools", "rpbi_data"},
     "rpbi_examples": MODULES.keys() - {"rpbi_examples"},
 }
@@ -77,6 +79,7 @@ BY_FEATURE = {
     "rpbi_examples",
     "rpbi_mpc",
     "rpbi_planning",
+    "rpbi_reality",
     "rpbi_ros2",
     "rpbi_utils",
     "safe_robot",

@@ -38,7 +38,7 @@ def test_extras_go_together():
 def test_an_unknown_extra_is_refused_with_the_known_ones():
     answer = subprocess.run([str(ROOT / "rpbi"), "setup", "ikk"], capture_output=True, text=True, timeout=300.0)
     assert answer.returncode == 2
-    known = "assets data farm foxglove gym html ik mpc notebook planning ros2 site tags wheel"
+    known = "assets data farm foxglove gym html identify ik mpc mujoco notebook planning ros2 site tags wheel"
     assert f"There is no extra 'ikk'; there are: {known}." in answer.stderr
 
 

@@ -36,6 +36,7 @@ TABLES = (
     "rpbi_utils.console",
     "rpbi_data.console",
     "rpbi_examples.console",
+    "rpbi_reality.console",
     "custom_ros_tools.console",
     "rpbi_data.datasets.formats",
 )
@@ -147,6 +148,7 @@ BY_FEATURE = {
     "rpbi_examples",
     "rpbi_mpc",
     "rpbi_planning",
+    "rpbi_reality",
     "rpbi_ros2",
     "rpbi_utils",
     "safe_robot",

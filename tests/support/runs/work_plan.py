@@ -69,6 +69,8 @@ EXTRA_OF = {
     "rosbags": "data",
     "cyclonedds": "ros2",
     "ray": "farm",
+    "mujoco": "mujoco",
+    "cmaes": "identify",
     "mkdocs": "site",
     "py_mini_racer": "site",
     "hatchling": "wheel",

@@ -11,6 +11,6 @@ def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> 
 
     Args:
         EXTRA: optional part to install and to keep up to date: ik, mpc, tags, data, gym, farm, html, assets,
-            site, notebook, foxglove, ros2 or wheel; see docs/installation.md
+            site, notebook, foxglove, ros2, identify, mujoco or wheel; see docs/installation.md
     """
     print("Ready.", file=sys.stderr)  # the program `rpbi` has already installed and built everything

@@ -184,6 +184,11 @@ class Body:
         """Called before the physics of each tick; does nothing by default."""
 
     @property
+    def needs_steps(self) -> bool:
+        """Whether `before_step` has to be called, if the class defines it."""
+        return True
+
+    @property
     def is_idle(self) -> bool:
         """Whether `before_step` has nothing to do until the next input or request."""
         return False

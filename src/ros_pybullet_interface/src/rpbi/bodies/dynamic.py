@@ -3,7 +3,8 @@
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import HzOrOff, Position, PositiveKilograms, Quat
+from custom_ros_tools.schema import ConfigModel, HzOrOff, NonNegative, Position, PositiveKilograms, Quat
+from rpbi.config.contact_presets import WithContactPreset
 from rpbi.config.pybullet_models import (
     ChangeDynamics,
     CreateCollisionShape,
@@ -22,7 +23,14 @@ from .body_config import BodyConfig
 from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
-class DynamicObjectConfig(BodyConfig):
+class ContactFriction(ConfigModel):
+    """Friction that depends on how many contact points share the load, as plastics have it under different pressures."""
+
+    edge: NonNegative = Field(description="Coulomb friction coefficient while the object has two contact points.")
+    face: NonNegative = Field(description="Coulomb friction coefficient while it has three contact points or more.")
+
+
+class DynamicObjectConfig(WithContactPreset, BodyConfig):
     """A dynamic object, which physics moves."""
 
     createVisualShape: CreateVisualShape = Field(description="Visual shape of the object.")
@@ -30,9 +38,17 @@ class DynamicObjectConfig(BodyConfig):
     changeDynamics: ChangeDynamics | None = Field(
         None, description="Friction, restitution and other dynamics parameters. By default, PyBullet's values."
     )
+    contactFriction: ContactFriction | None = Field(
+        None,
+        description="Friction on edges and faces; `lateralFriction` is then the friction on a single contact point. By "
+        "default, the friction does not depend on the number of contact points.",
+    )
     baseMass: PositiveKilograms = Field(description="Mass of the object.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position in the world.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation in the world, x, y, z, w.")
+    baseInertialFramePosition: Position = Field(
+        (0.0, 0.0, 0.0), description="Centre of mass in the object's frame; not with `useMaximalCoordinates`."
+    )
     useMaximalCoordinates: MaximalCoordinates = False
     convexDecomposition: Decomposition = None
     resetBaseVelocity: ResetBaseVelocity | None = Field(
@@ -71,6 +87,9 @@ class DynamicObject(ShapeObject):
         if config.useMaximalCoordinates and pb.is_deformable:
             message = "soft bodies have no contacts with bodies in maximal coordinates; remove it in a deformable world"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
+        if config.useMaximalCoordinates and any(config.baseInertialFramePosition):
+            message = "the centre of mass of a body in maximal coordinates is its origin; remove one of the two"
+            raise ConfigError([Problem(config.name, "baseInertialFramePosition", message)])
         if config.useMaximalCoordinates and config.tracked_tf is not None:
             message = "a body in maximal coordinates cannot follow TF; remove one of the two"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
@@ -84,12 +103,45 @@ class DynamicObject(ShapeObject):
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,
             useMaximalCoordinates=config.useMaximalCoordinates,
+            **(
+                {"baseInertialFramePosition": config.baseInertialFramePosition}
+                if any(config.baseInertialFramePosition)
+                else {}
+            ),
         )
         if config.changeDynamics is not None:
             self.change_dynamics(-1, **config.changeDynamics.kwargs())
         self._start_base(config.resetBaseVelocity)
         self._track(config.tracked_tf)
         self.config = config
+        self._corner_friction: float = self.dynamics_info(-1)[1]
+        self._present_friction: float | None = None
+        """Friction that `before_step` has set last; None if it has to be set again."""
+
+    @property
+    def needs_steps(self) -> bool:
+        """Whether the friction depends on the contacts."""
+        return self.config.contactFriction is not None
+
+    def before_step(self, tick: int) -> None:
+        """Sets the friction for the number of contact points after the last tick."""
+        friction = self.config.contactFriction
+        if friction is None:
+            return
+        points = len(self.pb.getContactPoints(self.body_id))
+        wanted = self._corner_friction if points < 2 else friction.edge if points == 2 else friction.face
+        if wanted != self._present_friction:
+            self.pb.changeDynamics(self.body_id, -1, lateralFriction=wanted)
+            self._present_friction = wanted
+
+    def restart(self) -> bool:
+        """Returns whether the body's initial state was restored, see `ShapeObject.restart`."""
+        self._present_friction = None
+        return super().restart()
+
+    def resume(self) -> None:
+        """Has the friction set again in another client."""
+        self._present_friction = None
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Returns the sensors of the object's pose, base state and contacts, each only if it is configured."""

@@ -36,6 +36,7 @@ from custom_ros_tools.transforms import quat_of
 from robot_model.asset_files import find_folder
 from rpbi.geometry import Pose
 
+from .contact_presets import WithContactPreset
 from .object_entry import FileOrOverrides
 from .pybullet_world_models import (
     ConfigureDebugVisualizer,
@@ -161,7 +162,7 @@ class AttachmentConfig(ConfigModel):
     )
 
 
-class WorldConfig(ConfigModel):
+class WorldConfig(WithContactPreset):
     """Keys of the main YAML file, except the lists of object files. `main_file_model` adds these lists."""
 
     model_config = ConfigDict(extra="ignore")

@@ -292,7 +292,7 @@ class WorldContents:
         self._register(body.name, *sensors_and_inputs(body, config))
         if body.pose_follower is not None:
             self.stepping.append(body.pose_follower)
-        if type(body).before_step is not Body.before_step:
+        if type(body).before_step is not Body.before_step and body.needs_steps:
             self.stepping.append(body)
 
     def _require_new(self, name: str, file: str | None) -> None:

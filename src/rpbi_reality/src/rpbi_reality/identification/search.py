@@ -1,0 +1,193 @@
+"""Searches for the parameters: robust least squares where motion is smooth, CMA-ES where contacts make it rough."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from custom_ros_tools.errors import InterfaceError, MissingDependency
+
+from .evaluator import Evaluator
+from .fit_config import FitConfig, ParameterConfig
+
+DIFFERENCE = 0.01
+"""Step of finite differences, as a fraction of the bounds."""
+NO_EFFECT = 1e-9
+"""Largest change of all errors at which nothing depends on a parameter."""
+
+
+class Space:
+    """Maps values of parameters to the unit cube and back.
+
+    Args:
+        parameters: The parameters, indexed by name.
+    """
+
+    def __init__(self, parameters: Mapping[str, ParameterConfig]) -> None:
+        self.names = list(parameters)
+        self._each = list(parameters.values())
+
+    def unit(self, values: Mapping[str, float]) -> np.ndarray:
+        """Returns the coordinates of values, each 0 to 1 within the bounds, shape (m,)."""
+        rows = []
+        for name, each in zip(self.names, self._each):
+            low, high, value = *each.bounds, values[name]
+            if each.scale == "log":
+                low, high, value = math.log(low), math.log(high), math.log(value)
+            rows.append((value - low) / (high - low))
+        return np.array(rows)
+
+    def values(self, unit: np.ndarray) -> dict[str, float]:
+        """Returns the values at coordinates, which are first brought within 0 and 1."""
+        found = {}
+        for name, each, place in zip(self.names, self._each, np.clip(unit, 0.0, 1.0).tolist()):
+            low, high = each.bounds
+            if each.scale == "log":
+                found[name] = math.exp(math.log(low) + place * (math.log(high) - math.log(low)))
+            else:
+                found[name] = low + place * (high - low)
+        return found
+
+    @property
+    def first(self) -> np.ndarray:
+        """Coordinates of the first values."""
+        return self.unit({name: each.first for name, each in zip(self.names, self._each)})
+
+    def prior(self, values: Mapping[str, float]) -> np.ndarray:
+        """Returns the distances from the means of the priors, in standard deviations."""
+        pairs = [(values[name], each.prior) for name, each in zip(self.names, self._each)]
+        return np.array([(value - prior[0]) / prior[1] for value, prior in pairs if prior is not None])
+
+
+class Found(NamedTuple):
+    """Result of a search.
+
+    Attributes:
+        unit: Best coordinates, shape (m,).
+        points: Coordinates of evaluated candidates near the best, shape (k, m).
+        runs: Error of each run for each of these candidates, shape (k, runs).
+        residuals: Residuals of each run at the best coordinates; empty for `cmaes`.
+        jacobians: Derivatives of these residuals, shape (residuals, m) for each run; empty for `cmaes`.
+    """
+
+    unit: np.ndarray
+    points: np.ndarray
+    runs: np.ndarray
+    residuals: list[np.ndarray]
+    jacobians: list[np.ndarray]
+
+
+def search(
+    config: FitConfig, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None] = lambda _: None
+) -> Found:
+    """Searches for the parameters with the smallest errors.
+
+    Args:
+        config: Parameters and method.
+        evaluate: Evaluates candidates.
+        runs: Indices of the runs from which parameters are identified.
+        report: Function that shows a line of progress.
+
+    Raises:
+        InterfaceError: If nothing depends on a parameter, or no candidate can be simulated.
+        MissingDependency: If `cmaes` is not installed.
+    """
+    space = Space(config.parameters)
+    _refuse_without_effect(config, space, evaluate, runs)
+    return (_cmaes if config.method == "cmaes" else _least_squares)(config, space, evaluate, runs, report)
+
+
+def _refuse_without_effect(config: FitConfig, space: Space, evaluate: Evaluator, runs: Sequence[int]) -> None:
+    """Raises an error that names parameters on which the errors do not depend."""
+    first, few = np.clip(space.first, 0.02, 0.98), runs[: min(len(runs), 10)]
+    shifted = [first + 0.25 * np.eye(len(first))[i] * (1.0 if first[i] < 0.6 else -1.0) for i in range(len(first))]
+    base, *others = evaluate([space.values(each) for each in (first, *shifted)], few)
+    if base.problems and len(base.problems) >= len(few):
+        raise InterfaceError(f"the world cannot be simulated with the first values: {base.problems[0]}")
+    idle = [n for n, each in zip(space.names, others) if abs(each.runs - base.runs).max() <= NO_EFFECT]
+    if idle:
+        raise InterfaceError(f"nothing measured depends on {', '.join(idle)}; remove it, or add a signal")
+
+
+def _least_squares(
+    config: FitConfig, space: Space, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
+) -> Found:
+    """Trust region reflective (Branch, Coleman and Li 1999) with the loss soft L1 over all residuals."""
+    count = len(space.names)
+    last: dict[str, list[np.ndarray]] = {}
+
+    def rows(unit: np.ndarray) -> np.ndarray:
+        evaluation = evaluate([space.values(unit)], runs)[0]
+        report(f"{evaluate.count} candidates, error {math.sqrt(evaluation.runs.mean()):.4g} sigma")
+        last["residuals"] = evaluation.residuals
+        return np.concatenate([*evaluation.residuals, space.prior(space.values(unit))])
+
+    def jacobian(unit: np.ndarray) -> np.ndarray:
+        """Central differences; one-sided at the bounds."""
+        low = np.maximum(unit - DIFFERENCE, 0.0)
+        high = np.minimum(unit + DIFFERENCE, 1.0)
+        steps = [np.where(np.arange(count) == i, side, unit) for i in range(count) for side in (low, high)]
+        found = evaluate([space.values(each) for each in steps], runs)
+        columns, priors = [], []
+        for i in range(count):
+            before, after = found[2 * i], found[2 * i + 1]
+            width = high[i] - low[i]
+            columns.append([(b - a) / width for a, b in zip(before.residuals, after.residuals)])
+            before_prior, after_prior = (space.prior(space.values(steps[2 * i + side])) for side in (0, 1))
+            priors.append((after_prior - before_prior) / width)
+        last["jacobians"] = [np.stack([column[run] for column in columns], 1) for run in range(len(runs))]
+        return np.vstack([*last["jacobians"], np.stack(priors, 1)])
+
+    most = max(3, config.evaluations // (2 * count + 1))
+    solved = least_squares(
+        rows,
+        np.clip(space.first, 1e-3, 1.0 - 1e-3),
+        jacobian,
+        (0.0, 1.0),
+        loss="soft_l1",
+        f_scale=0.5,
+        max_nfev=most,
+        x_scale="jac",
+        xtol=1e-6,
+        ftol=1e-6,
+    )
+    rows(solved.x)
+    jacobian(solved.x)
+    return Found(solved.x, np.zeros((0, count)), np.zeros((0, len(runs))), last["residuals"], last["jacobians"])
+
+
+def _cmaes(
+    config: FitConfig, space: Space, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
+) -> Found:
+    """Covariance matrix adaptation evolution strategy (Hansen 2016), of the library `cmaes`."""
+    try:
+        from cmaes import CMA
+    except ModuleNotFoundError:
+        raise MissingDependency("cmaes", "./rpbi setup identify") from None
+    count = len(space.names)
+    bounds = np.array([[0.0, 1.0]] * count)
+    strategy = CMA(np.clip(space.first, 0.02, 0.98), config.step, bounds=bounds, seed=config.seed)
+    points: list[np.ndarray] = []
+    errors: list[np.ndarray] = []
+    best, means = math.inf, []
+    while evaluate.count + strategy.population_size <= config.evaluations and not strategy.should_stop():
+        asked = [strategy.ask() for _ in range(strategy.population_size)]
+        found = evaluate([space.values(each) for each in asked], runs)
+        costs = [each.runs.mean() + (space.prior(space.values(x)) ** 2).sum() for x, each in zip(asked, found)]
+        strategy.tell(list(zip(asked, costs)))
+        points += asked
+        errors += [each.runs for each in found]
+        means.append(strategy.mean.copy())
+        best = min(best, *costs)
+        report(f"{evaluate.count} candidates, error {best:.4g}")
+    if not math.isfinite(best) or best >= 1e3:
+        problems = "; ".join(list(evaluate.problems)[:1]) or "all simulations diverged"
+        raise InterfaceError(f"no candidate could be simulated: {problems}")
+    centre = np.mean(means[-5:], 0)
+    table = np.array(errors)
+    near = np.argsort(table.mean(1))[: max(4 * count * (count + 3) // 2, len(table) // 2)]
+    return Found(centre, np.array(points)[near], table[near], [], [])
