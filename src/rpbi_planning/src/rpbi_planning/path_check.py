@@ -52,12 +52,15 @@ class PathCheck:
         self.scene = scene
         self._robot, self._joint_names = robot, tuple(joint_names)
         self._model: CollisionModel | None = None
+        self._version = -1
+        """Version of the scene for which the model was made."""
 
     def first_meeting(self, motion: Motion, from_s: float = 0.0) -> str:
         """Returns the shapes that come too near to each other after a time [s], as text; empty if there are none."""
-        if self._model is None or self._model.scene is not self.scene or self._model.version != self.scene.version:
+        if self._model is None or self._model.scene is not self.scene or self._version != self.scene.version:
             self._model = CollisionModel(self.scene, Group(self.scene, [self._robot], self._joint_names))
             self._model.set_paddings(SHARE * self._model.padding)
+            self._version = self.scene.version
         else:
             self._model.update()
         rest = RestOfMotion(motion, min(from_s, motion.duration))
