@@ -402,6 +402,11 @@ class CollisionModel:
             request.security_margin = each
         self._all_padding = np.concatenate([padding, np.zeros(len(self.margins))])
 
+    @property
+    def is_lowered(self) -> bool:
+        """Whether a padding is less than that of the scene."""
+        return bool((self.padding < self._own_padding).any())
+
     def _places(self, q: Array) -> Array:
         """Returns the poses of all shapes in the world in k configurations, k x shapes x 4 x 4."""
         places = np.repeat(self._local[None], len(q), axis=0)
