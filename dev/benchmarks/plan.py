@@ -20,7 +20,7 @@ from result import Result, Target
 from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose
 from rpbi.world import World
-from rpbi_planning import JointGoal, PlanningScene, Trajectory, plan
+from rpbi_planning import JointGoal, PlannedTrajectory, PlanningScene, plan
 from rpbi_planning.certify import guard_of
 from rpbi_planning.collision import CollisionModel, Group
 from rpbi_planning.foresee import execute
@@ -199,13 +199,13 @@ class Oracle:
         pybullet.disconnect(self._pb)
 
 
-def dense(trajectory: Trajectory, step: float) -> np.ndarray:
+def dense(trajectory: PlannedTrajectory, step: float) -> np.ndarray:
     """Samples a curve so that no joint moves by more than about `step` between two samples [rad or m]."""
     speed = max(float(np.abs(trajectory.velocities).max()), 1e-6)
     return trajectory.at(np.linspace(0.0, trajectory.duration_s, int(speed * trajectory.duration_s / step) + 2))
 
 
-def passed_limits(group: Group, trajectory: Trajectory) -> int:
+def passed_limits(group: Group, trajectory: PlannedTrajectory) -> int:
     """Counts samples of a curve, by finite differences of its positions, that pass a limit by more than 0.1 %."""
     dt = 1e-3
     q = trajectory.at(np.arange(-3.0, trajectory.duration_s / dt + 4.0) * dt)
@@ -216,7 +216,7 @@ def passed_limits(group: Group, trajectory: Trajectory) -> int:
     return count
 
 
-def stopped_by_guard(made: BenchScene, trajectory: Trajectory) -> bool:
+def stopped_by_guard(made: BenchScene, trajectory: PlannedTrajectory) -> bool:
     """Returns whether a guard with a period of 10 ms stops a motion."""
     for r, robot in enumerate(made.group.robots):
         guard = guard_of(made.scene, robot, 0.0, 0.01)

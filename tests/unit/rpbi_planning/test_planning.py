@@ -17,10 +17,10 @@ from rpbi_planning import (
     JointGoal,
     NamedGoal,
     OnPlane,
+    PlannedTrajectory,
     PlanningScene,
     PoseGoal,
     RegionGoal,
-    Trajectory,
     Upright,
     plan,
 )
@@ -70,11 +70,11 @@ def straight(count: int = 500) -> np.ndarray:
     return POSTURE + np.linspace(0.0, 1.0, count)[:, None] * np.subtract(GOAL, POSTURE)
 
 
-def dense(trajectory: Trajectory) -> np.ndarray:
+def dense(trajectory: PlannedTrajectory) -> np.ndarray:
     return trajectory.at(np.linspace(0.0, trajectory.duration_s, 2000))
 
 
-def check_limits(group: Group, trajectory: Trajectory) -> None:
+def check_limits(group: Group, trajectory: PlannedTrajectory) -> None:
     assert (np.abs(trajectory.velocities) <= group.velocity).all()
     assert (np.abs(trajectory.accelerations) <= group.acceleration).all()
     assert (np.abs(trajectory.jerks) <= group.jerk).all()

@@ -10,7 +10,7 @@ from safe_robot.guard import Guard
 
 from .collision import Group
 from .scene import PlanningScene, SceneRobot
-from .timing import PathTiming, Trajectory
+from .timing import PathTiming, PlannedTrajectory
 
 PERIOD_S = 0.02
 """Time between two commands that are checked [s]."""
@@ -67,7 +67,7 @@ class Refusal(NamedTuple):
 
 
 def refusal(
-    scene: PlanningScene, group: Group, trajectory: Trajectory, r: int, margin_m: float = 0.0
+    scene: PlanningScene, group: Group, trajectory: PlannedTrajectory, r: int, margin_m: float = 0.0
 ) -> Refusal | None:
     """Returns the first command of a motion that the guard of one robot of a group refuses; None if there is none."""
     robot = group.robots[r]
@@ -93,7 +93,9 @@ def _may_touch(scene: PlanningScene, robot: str, body: str) -> bool:
     return any(body in pair and any(name.split("/")[0] == robot for name in pair) for pair in scene.allowed)
 
 
-def certified(scene: PlanningScene, group: Group, timing: PathTiming, padding_m: float) -> tuple[Trajectory, str]:
+def certified(
+    scene: PlanningScene, group: Group, timing: PathTiming, padding_m: float
+) -> tuple[PlannedTrajectory, str]:
     """Passes a motion, whose distance from bodies is at least `padding_m`, through the guard's checks.
 
     Where braking would leave the path and touch something, the motion stops at the nearest corner. If there is no

@@ -18,12 +18,12 @@ from safe_robot.limits import MotionLimits
 from .certify import certified
 from .collision import CollisionModel, Group, Meeting, collision_model
 from .constraints import BoundConstraint, PathConstraint
-from .goals import Goal
+from .goals import PlanningGoal
 from .planner import PlanningProblem, length
 from .planners import PLANNERS
 from .scene import PlanningScene
 from .shortening import shortened
-from .timing import JointLimits, PathTiming, Trajectory
+from .timing import PathTiming, PlannedTrajectory, TimingLimits
 
 if TYPE_CHECKING:
     from rpbi.world import World
@@ -64,7 +64,7 @@ class PlanResult:
     message: str
     joint_names: tuple[str, ...]
     path: Array
-    trajectory: Trajectory | None = None
+    trajectory: PlannedTrajectory | None = None
     planner: str = ""
     times_s: Mapping[str, float] = field(default_factory=dict)
     foreseen: Foreseen | None = None
@@ -85,7 +85,7 @@ class _Clock:
 def plan(
     scene: PlanningScene,
     robot: str | Sequence[str],
-    goal: Goal | Mapping[str, Goal],
+    goal: PlanningGoal | Mapping[str, PlanningGoal],
     *,
     start: Mapping[str, float] | Sequence[float] | None = None,
     group: Sequence[str] | None = None,
@@ -172,7 +172,7 @@ class _Plan:
     def run(
         self,
         full: Sequence[Array],
-        goal: Goal | Mapping[str, Goal],
+        goal: PlanningGoal | Mapping[str, PlanningGoal],
         constraints: Sequence[PathConstraint],
         planner: str,
         time_limit_s: float,
@@ -211,7 +211,7 @@ class _Plan:
             path = shortened(path, model, time.monotonic() + shorten_s, self._seed, self._is_cancelled)
         self._clock.note("shortening")
         scales = (share * speed**power for power, share in enumerate(RESERVE, 1))
-        limits = JointLimits(*(scale * each for scale, each in zip(scales, group.motion_limits)))
+        limits = TimingLimits(*(scale * each for scale, each in zip(scales, group.motion_limits)))
         timing = PathTiming(group.joint_names, path, limits)
         trajectory = timing.stop_until(model.first_unproven)
         self._clock.note("timing")
@@ -297,7 +297,7 @@ class _Plan:
         model: CollisionModel,
         full: Sequence[Array],
         start: Array,
-        goal: Goal | Mapping[str, Goal],
+        goal: PlanningGoal | Mapping[str, PlanningGoal],
         bound: Sequence[BoundConstraint],
     ) -> tuple[Array, str]:
         """Returns configurations of the goal that are free, the nearest first, or a reason."""
