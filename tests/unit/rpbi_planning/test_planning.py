@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 import time
 from pathlib import Path
 
@@ -10,7 +12,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.errors import InterfaceError, MissingDependency, UnknownNameError
 from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose, rotated_back
 from rpbi_planning import (
@@ -306,3 +308,10 @@ def test_equal_seeds_give_equal_paths(scene):
         for _ in range(2)
     )
     assert len(first) > 2 and (first == second).all()
+
+
+def test_missing_library_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ompl", None)
+    monkeypatch.delitem(sys.modules, "rpbi_planning.planners.ompl_planner", raising=False)
+    with pytest.raises(MissingDependency, match=r"\./rpbi setup planning"):
+        importlib.import_module("rpbi_planning.planners.ompl_planner")
