@@ -82,7 +82,16 @@ def check_limits(group: Group, trajectory: PlannedTrajectory) -> None:
     assert (np.abs(trajectory.jerks) <= group.jerk).all()
 
 
-@pytest.mark.parametrize("planner", ["rrt_connect", "aorrtc", "bit_star", "prm", "projected"])
+@pytest.mark.parametrize(
+    "planner",
+    [
+        "rrt_connect",
+        pytest.param("aorrtc", marks=pytest.mark.thorough),
+        pytest.param("bit_star", marks=pytest.mark.thorough),
+        "prm",
+        "projected",
+    ],
+)
 def test_planners_find_free_timed_motions(scene, bullet, planner):
     limit = {"time_limit_s": 6.0} if planner in ("aorrtc", "bit_star") else {}
     result = plan(scene, "arm", JointGoal(GOAL), planner=planner, seed=3, **(QUICK | limit))
@@ -137,7 +146,7 @@ def test_named_goal_and_group(scene):
     assert result.path[-1] == pytest.approx([0.0])
 
 
-@pytest.mark.parametrize("constraint", [Upright, OnPlane])
+@pytest.mark.parametrize("constraint", [Upright, pytest.param(OnPlane, marks=pytest.mark.thorough)])
 def test_constraint_is_kept_on_the_whole_curve(scene, constraint):
     scene.remove("post")
     scene.add(Obstacle("post", "box", (0.08, 0.08, 0.5), Pose((-0.6, 0.0, 0.25))))
