@@ -214,6 +214,7 @@ FAMILIES = {
     "primitive": ("motion_primitives.primitives:PRIMITIVES", "motion_primitives.primitive:Primitive", "learning.md"),
     "gym task": ("rpbi.gym.tasks:TASKS", "rpbi.gym.task:WorldTask", "gym.md"),
     "scene": ("rpbi_examples.scenes:SCENES", "rpbi_examples.scenes.scene:Scene", "examples.md"),
+    "planner": ("rpbi_planning.planners:PLANNERS", "rpbi_planning.planner:Planner", "planning.md"),
     "format": ("rpbi_data.datasets.formats:FORMATS", "rpbi_data.datasets.format:DatasetFormat", "datasets.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""

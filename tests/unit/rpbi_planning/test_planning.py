@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 import time
 from pathlib import Path
 
@@ -10,17 +12,17 @@ import numpy as np
 import pybullet
 import pytest
 
-from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.errors import InterfaceError, MissingDependency, UnknownNameError
 from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose, rotated_back
 from rpbi_planning import (
     JointGoal,
     NamedGoal,
     OnPlane,
+    PlannedTrajectory,
     PlanningScene,
     PoseGoal,
     RegionGoal,
-    Trajectory,
     Upright,
     plan,
 )
@@ -70,17 +72,26 @@ def straight(count: int = 500) -> np.ndarray:
     return POSTURE + np.linspace(0.0, 1.0, count)[:, None] * np.subtract(GOAL, POSTURE)
 
 
-def dense(trajectory: Trajectory) -> np.ndarray:
+def dense(trajectory: PlannedTrajectory) -> np.ndarray:
     return trajectory.at(np.linspace(0.0, trajectory.duration_s, 2000))
 
 
-def check_limits(group: Group, trajectory: Trajectory) -> None:
+def check_limits(group: Group, trajectory: PlannedTrajectory) -> None:
     assert (np.abs(trajectory.velocities) <= group.velocity).all()
     assert (np.abs(trajectory.accelerations) <= group.acceleration).all()
     assert (np.abs(trajectory.jerks) <= group.jerk).all()
 
 
-@pytest.mark.parametrize("planner", ["rrt_connect", "aorrtc", "bit_star", "prm", "projected"])
+@pytest.mark.parametrize(
+    "planner",
+    [
+        "rrt_connect",
+        pytest.param("aorrtc", marks=pytest.mark.thorough),
+        pytest.param("bit_star", marks=pytest.mark.thorough),
+        "prm",
+        "projected",
+    ],
+)
 def test_planners_find_free_timed_motions(scene, bullet, planner):
     limit = {"time_limit_s": 6.0} if planner in ("aorrtc", "bit_star") else {}
     result = plan(scene, "arm", JointGoal(GOAL), planner=planner, seed=3, **(QUICK | limit))
@@ -135,7 +146,7 @@ def test_named_goal_and_group(scene):
     assert result.path[-1] == pytest.approx([0.0])
 
 
-@pytest.mark.parametrize("constraint", [Upright, OnPlane])
+@pytest.mark.parametrize("constraint", [Upright, pytest.param(OnPlane, marks=pytest.mark.thorough)])
 def test_constraint_is_kept_on_the_whole_curve(scene, constraint):
     scene.remove("post")
     scene.add(Obstacle("post", "box", (0.08, 0.08, 0.5), Pose((-0.6, 0.0, 0.25))))
@@ -306,3 +317,10 @@ def test_equal_seeds_give_equal_paths(scene):
         for _ in range(2)
     )
     assert len(first) > 2 and (first == second).all()
+
+
+def test_missing_library_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ompl", None)
+    monkeypatch.delitem(sys.modules, "rpbi_planning.planners.ompl_planner", raising=False)
+    with pytest.raises(MissingDependency, match=r"\./rpbi setup planning"):
+        importlib.import_module("rpbi_planning.planners.ompl_planner")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rpbi_planning.timing import JointLimits, PathTiming, Trajectory
+from rpbi_planning.timing import PathTiming, PlannedTrajectory, TimingLimits
 
-LIMITS = JointLimits(np.array((1.0, 2.0, 0.5)), np.array((4.0, 3.0, 5.0)), np.array((30.0, 40.0, 20.0)))
+LIMITS = TimingLimits(np.array((1.0, 2.0, 0.5)), np.array((4.0, 3.0, 5.0)), np.array((30.0, 40.0, 20.0)))
 NAMES = ("a", "b", "c")
 
 
@@ -19,7 +19,7 @@ def timing(path: np.ndarray) -> PathTiming:
     return PathTiming(NAMES, path, LIMITS)
 
 
-def exceeded(trajectory: Trajectory, limits: JointLimits) -> bool:
+def exceeded(trajectory: PlannedTrajectory, limits: TimingLimits) -> bool:
     rates = trajectory.velocities, trajectory.accelerations, trajectory.jerks
     return any((np.abs(rate) > limit * (1.0 + 1e-9)).any() for rate, limit in zip(rates, limits))
 

@@ -8,9 +8,9 @@ from robot_model.geometry import Pose, Vector, plus
 
 LINK = "panda_grasptarget"
 """Link between the fingertips. Its z axis points away from the hand; the fingers close along its y axis."""
-BEFORE_M, LIFT_M, GAP_M = 0.12, 0.02, 0.003
-"""Distance of the hand in front of a box before and after a grasp, height of the lift before the transport, and height
-above the board at which the box is released [m].
+BEFORE_M, NEAR_M, LIFT_M, GAP_M = 0.12, 0.045, 0.02, 0.003
+"""Distance of the hand in front of a box before and after a grasp, distance at which the fingers are just clear of the
+box, height of the lift before the transport, and height above the board at which the box is released [m].
 """
 
 
@@ -29,9 +29,9 @@ class Bookcase(NamedTuple):
         """Returns the pose of `LINK` at a position in the world [m]: into the bookcase, with level fingers."""
         return Pose(place, (-0.5 * self.side, 0.5, 0.5 * self.side, 0.5))
 
-    def in_front(self, place: Vector) -> Pose:
-        """Returns the pose of `LINK` in front of a box at a position in the world [m]."""
-        return self.hand_at(plus(place, (0.0, -BEFORE_M * self.side, 0.0)))
+    def in_front(self, place: Vector, distance_m: float = BEFORE_M) -> Pose:
+        """Returns the pose of `LINK` at a distance in front of a box at a position in the world [m]."""
+        return self.hand_at(plus(place, (0.0, -distance_m * self.side, 0.0)))
 
     def has(self, place: Vector) -> bool:
         """Returns whether the middle of a box at a position in the world [m] is in the bookcase."""
@@ -73,11 +73,13 @@ def carry(box: Vector, source: Bookcase, goal: Bookcase) -> tuple[Step, ...]:
     place = (x, goal.side * abs(y), z + GAP_M)
     return (
         Step(source.in_front(box)),
+        Step(source.in_front(box, NEAR_M)),
         Step(source.hand_at(box)),
         CLOSED,
         Step(source.hand_at(plus(box, (0.0, 0.0, LIFT_M))), held=True, may_touch=source.name),
         Step(goal.hand_at(plus(place, (0.0, 0.0, LIFT_M))), held=True),
         Step(goal.hand_at(place), held=True, may_touch=goal.name),
         OPEN,
+        Step(goal.in_front(place, NEAR_M)),  # on the way out, the box is between the fingers
         Step(goal.in_front(place)),
     )

@@ -12,23 +12,23 @@ if TYPE_CHECKING:
     from .constraints import Upright as Upright
     from .constraints import WithinCone as WithinCone
     from .constraints import constraint_from as constraint_from
-    from .goals import Goal as Goal
     from .goals import JointGoal as JointGoal
     from .goals import NamedGoal as NamedGoal
+    from .goals import PlanningGoal as PlanningGoal
     from .goals import PoseGoal as PoseGoal
     from .goals import RegionGoal as RegionGoal
     from .goals import goal_from as goal_from
     from .planning import PlanResult as PlanResult
     from .planning import plan as plan
     from .scene import PlanningScene as PlanningScene
-    from .timing import Trajectory as Trajectory
+    from .timing import PlannedTrajectory as PlannedTrajectory
 
 _MODULES = {
     "constraints": ("OnPlane", "PathConstraint", "Upright", "WithinCone", "constraint_from"),
-    "goals": ("Goal", "JointGoal", "NamedGoal", "PoseGoal", "RegionGoal", "goal_from"),
+    "goals": ("PlanningGoal", "JointGoal", "NamedGoal", "PoseGoal", "RegionGoal", "goal_from"),
     "planning": ("PlanResult", "plan"),
     "scene": ("PlanningScene",),
-    "timing": ("Trajectory",),
+    "timing": ("PlannedTrajectory",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

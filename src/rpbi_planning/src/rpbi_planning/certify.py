@@ -10,10 +10,14 @@ from safe_robot.guard import Guard
 
 from .collision import Group
 from .scene import PlanningScene, SceneRobot
-from .timing import PathTiming, Trajectory
+from .timing import PathTiming, PlannedTrajectory
 
 PERIOD_S = 0.02
 """Time between two commands that are checked [s]."""
+MARGIN_M = 1e-3
+"""Margin of the guard's distances to bodies [m], for braking that begins between two commands that are checked."""
+SHAPES_M = 2e-3
+"""Largest difference between distances by PyBullet, whose shapes have rounded edges, and by hpp-fcl [m]."""
 SLOWER = 1.5
 """Factor of the duration when the guard refuses a motion because braking would leave the path."""
 SLOWEST = 12.0
@@ -29,7 +33,7 @@ def guard_of(scene: PlanningScene, robot: SceneRobot, margin_m: float = 0.0, per
     Args:
         scene: The scene.
         robot: The robot.
-        margin_m: Least distance [m].
+        margin_m: Least distance from bodies [m].
         period_s: Time between two commands [s].
     """
     limits = robot.limits
@@ -43,7 +47,7 @@ def guard_of(scene: PlanningScene, robot: SceneRobot, margin_m: float = 0.0, per
             "acceleration": {name: float(limits.acceleration[i]) * (1.0 + 1e-6) for name, i in by_joint.items()},
             "jerk": {name: float(limits.jerk[i]) * (1.0 + 1e-3) for name, i in by_joint.items()},
         },
-        "checks": {"self_collision": {"margin_m": margin_m}, "environment": {"margin_m": margin_m}},
+        "checks": {"self_collision": {"margin_m": 0.0}, "environment": {"margin_m": margin_m}},
     }
     return Guard(GuardConfig.parse(options, robot.model.urdf_path), robot.model, robot.model.urdf_path)
 
@@ -62,12 +66,14 @@ class Refusal(NamedTuple):
     words: str
 
 
-def refusal(scene: PlanningScene, group: Group, trajectory: Trajectory, r: int) -> Refusal | None:
+def refusal(
+    scene: PlanningScene, group: Group, trajectory: PlannedTrajectory, r: int, margin_m: float = 0.0
+) -> Refusal | None:
     """Returns the first command of a motion that the guard of one robot of a group refuses; None if there is none."""
     robot = group.robots[r]
-    key = tuple(each.tobytes() for each in robot.limits)
+    key = margin_m, *(each.tobytes() for each in robot.limits)
     if robot.guard is None or robot.guard[0] != key:
-        robot.guard = key, guard_of(scene, robot)
+        robot.guard = key, guard_of(scene, robot, margin_m)
     guard = robot.guard[1]
     obstacles = tuple(each for each in scene.obstacles_for(robot.name) if not _may_touch(scene, robot.name, each.name))
     context = CheckContext(obstacles=obstacles)
@@ -87,8 +93,10 @@ def _may_touch(scene: PlanningScene, robot: str, body: str) -> bool:
     return any(body in pair and any(name.split("/")[0] == robot for name in pair) for pair in scene.allowed)
 
 
-def certified(scene: PlanningScene, group: Group, timing: PathTiming) -> tuple[Trajectory, str]:
-    """Passes a motion through the guard's checks.
+def certified(
+    scene: PlanningScene, group: Group, timing: PathTiming, padding_m: float
+) -> tuple[PlannedTrajectory, str]:
+    """Passes a motion, whose distance from bodies is at least `padding_m`, through the guard's checks.
 
     Where braking would leave the path and touch something, the motion stops at the nearest corner. If there is no
     corner left, the whole motion becomes slower.
@@ -97,8 +105,9 @@ def certified(scene: PlanningScene, group: Group, timing: PathTiming) -> tuple[T
         The motion, and the reason for which the guard refuses it; empty if the guard accepts it.
     """
     trajectory, factor = timing.trajectory, 1.0
+    margin_m = MARGIN_M if padding_m > MARGIN_M + SHAPES_M else 0.0
     while True:
-        found = (refusal(scene, group, trajectory, r) for r in range(len(group.robots)))
+        found = (refusal(scene, group, trajectory, r, margin_m) for r in range(len(group.robots)))
         refused = next((each for each in found if each is not None), None)
         if refused is None or not refused.is_while_braking:
             return trajectory, "" if refused is None else refused.words

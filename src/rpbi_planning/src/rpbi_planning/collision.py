@@ -8,12 +8,12 @@ the interval is divided (Schwarzer, Saha and Latombe, 2005, Adaptive dynamic col
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from custom_ros_tools.errors import ConfigError, MissingDependency, Problem, UnknownNameError
+from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from custom_ros_tools.transforms import matrix_of
 from robot_model.collision.distances import LinkDistances
 from robot_model.collision.shapes import Obstacle
@@ -29,9 +29,10 @@ except ImportError:
 
 from robot_model.collision.fcl import FclShapes, Hull, hull_of, hulls_of_links
 
+from .group import Array
+from .group import Group as Group
 from .scene import PlanningScene, SceneRobot
 
-Array = np.ndarray
 SMALLEST_STEP = 1e-5
 """Motion of a joint [rad or m] below which an interval is no longer divided: it counts as not free."""
 NEAR_M = 1e-3
@@ -84,7 +85,7 @@ class Margin(Protocol):
         """Returns the margins in k configurations, shape (k,); a negative margin is not allowed."""
 
 
-class Motion(Protocol):
+class JointMotion(Protocol):
     """A motion of n joints from time 0 to `duration`."""
 
     @property
@@ -98,93 +99,26 @@ class Motion(Protocol):
         """Returns upper bounds on the joint motion (total variation) between k pairs of times, k x n [rad or m]."""
 
 
-class Line:
+class StraightMotion:
     """The straight motion from one configuration to another, from time 0 to 1."""
 
     @property
     def duration(self) -> float:
-        """See `Motion`."""
+        """See `JointMotion`."""
         return 1.0
 
     def __init__(self, start: Array, end: Array) -> None:
         self._start, self._change = start, end - start
 
     def at(self, times: Array) -> Array:
-        """See `Motion`."""
+        """See `JointMotion`."""
         q: Array = self._start + times[:, None] * self._change
         return q
 
     def variation(self, start: Array, end: Array) -> Array:
-        """See `Motion`."""
+        """See `JointMotion`."""
         motion: Array = (end - start)[:, None] * np.abs(self._change)
         return motion
-
-
-class Group:
-    """The joints that a plan moves, of one or several robots.
-
-    Args:
-        scene: The scene.
-        robots: Names of the robots.
-        joints: Names of the joints that move; None for all driven joints. With several robots, names are `robot/joint`.
-
-    Attributes:
-        robots: The robots.
-        joint_names: Names of the n joints.
-        lower, upper: Position limits [rad or m].
-        velocity, acceleration, jerk: Limits of the n joints.
-
-    Raises:
-        ValueError: If no joint is left, or a joint is unknown.
-    """
-
-    def __init__(self, scene: PlanningScene, robots: Sequence[str], joints: Sequence[str] | None = None) -> None:
-        self.robots = [scene.robot(name) for name in robots]
-        many = len(self.robots) > 1
-        names = [
-            (f"{robot.name}/{joint}" if many else joint, r, i)
-            for r, robot in enumerate(self.robots)
-            for i, joint in enumerate(robot.model.joint_names)
-        ]
-        known = [name for name, _, _ in names]
-        if joints is not None:
-            for joint in joints:
-                if joint not in known:
-                    raise UnknownNameError("joint", joint, known)
-            names = [each for each in names if each[0] in set(joints)]
-        if not names:
-            raise ValueError("group: expected at least one joint, got none")
-        self.joint_names = tuple(name for name, _, _ in names)
-        self.columns = [[i for _, owner, i in names if owner == r] for r in range(len(self.robots))]
-        self.slices = [[at for at, (_, owner, _) in enumerate(names) if owner == r] for r in range(len(self.robots))]
-        limits = [robot.limits for robot in self.robots]
-        self.lower, self.upper, self.velocity, self.acceleration, self.jerk = (
-            np.concatenate([getattr(each, key)[columns] for each, columns in zip(limits, self.columns)])
-            for key in ("lower", "upper", "velocity", "acceleration", "jerk")
-        )
-
-    def full(self, q: Array, robot: int) -> Array:
-        """Returns all driven positions of one of the robots in k configurations of the group, k x m."""
-        positions = np.repeat(self.robots[robot].positions[None], len(q), axis=0)
-        positions[:, self.columns[robot]] = q[:, self.slices[robot]]
-        return positions
-
-    def of(self, positions: Sequence[Array]) -> Array:
-        """Returns the positions of the group from all driven positions of each robot, shape (n,)."""
-        q = np.empty(len(self.joint_names))
-        for at, columns, each in zip(self.slices, self.columns, positions):
-            q[at] = each[columns]
-        return q
-
-    @property
-    def motion_limits(self) -> tuple[Array, Array, Array]:
-        """Limits of velocity, acceleration and jerk, shape (n,) each."""
-        return self.velocity, self.acceleration, self.jerk
-
-    @property
-    def present(self) -> Array:
-        """The present positions of the group, shape (n,)."""
-        return self.of([robot.positions for robot in self.robots])
 
 
 class _Shape(NamedTuple):
@@ -402,6 +336,11 @@ class CollisionModel:
             request.security_margin = each
         self._all_padding = np.concatenate([padding, np.zeros(len(self.margins))])
 
+    @property
+    def is_lowered(self) -> bool:
+        """Whether a padding is less than that of the scene."""
+        return bool((self.padding < self._own_padding).any())
+
     def _places(self, q: Array) -> Array:
         """Returns the poses of all shapes in the world in k configurations, k x shapes x 4 x 4."""
         places = np.repeat(self._local[None], len(q), axis=0)
@@ -458,7 +397,7 @@ class CollisionModel:
         """
         for i, q in enumerate(path):
             before = path[max(i - 1, 0)]
-            if (share := self.first_unproven(Line(before, q))) is not None:
+            if (share := self.first_unproven(StraightMotion(before, q))) is not None:
                 at = before + share * (q - before)
                 near = self.meetings(at) or self.meetings(q)
                 if near:
@@ -468,7 +407,7 @@ class CollisionModel:
 
     # --- Proofs
 
-    def proves(self, motion: Motion) -> bool:
+    def proves(self, motion: JointMotion) -> bool:
         """Returns whether a motion is proven to keep all paddings and margins at all times."""
         return self.first_unproven(motion) is None
 
@@ -479,9 +418,9 @@ class CollisionModel:
         for share in shares[np.argsort(np.abs(shares - 0.5))].tolist():
             if not self.is_free(start + share * (end - start)):
                 return False
-        return self.proves(Line(start, end))
+        return self.proves(StraightMotion(start, end))
 
-    def first_unproven(self, motion: Motion) -> float | None:
+    def first_unproven(self, motion: JointMotion) -> float | None:
         """Returns a time at which a motion is not proven to be free; None for a motion that is free."""
         self.proofs += 1
         pairs = len(self.first)
@@ -529,7 +468,7 @@ class CollisionModel:
             which = np.concatenate((which, which))
         return None
 
-    def _exact(self, known: dict[float, Array], motion: Motion, time: float, which: Array) -> Array:
+    def _exact(self, known: dict[float, Array], motion: JointMotion, time: float, which: Array) -> Array:
         """Returns exact distances of pairs at one time of a motion, less the padding [m]."""
         if time not in known:
             known[time] = np.full(len(self.first), np.nan)
@@ -605,8 +544,3 @@ def _hull_of(body: str, shape: Obstacle) -> Hull:
         return hull_of(shape)
     except ValueError as error:
         raise ConfigError([Problem(shape.mesh_file, f"body '{body}'", str(error))]) from None
-
-
-def positions_by_name(group: Group, q: Array) -> Mapping[str, float]:
-    """Returns the positions of a group as a mapping from joint names [rad or m]."""
-    return dict(zip(group.joint_names, q.tolist()))

@@ -10,7 +10,7 @@ import numpy as np
 from rpbi.world.forks.prediction import PlannedInput
 
 from .collision import Group
-from .timing import Trajectory
+from .timing import PlannedTrajectory
 
 if TYPE_CHECKING:
     from rpbi.world import World
@@ -40,7 +40,7 @@ class Foreseen(NamedTuple):
     ticks: int
 
 
-def inputs_of(world: World, group: Group, trajectory: Trajectory) -> list[PlannedInput]:
+def inputs_of(world: World, group: Group, trajectory: PlannedTrajectory) -> list[PlannedInput]:
     """Returns the joint targets of a motion, one for each tick; put them at these ticks to execute the motion."""
     dt_s = world.clock.dt_s
     count = int(np.ceil(trajectory.duration_s / dt_s)) + 1
@@ -88,12 +88,12 @@ def run(world: Any, inputs: list[PlannedInput], robots: list[str], ticks: int) -
     return Foreseen(tuple(contacts), loads, poses, positions, world.state_hash(), ticks)
 
 
-def ticks_of(world: World, trajectory: Trajectory) -> int:
+def ticks_of(world: World, trajectory: PlannedTrajectory) -> int:
     """Returns the number of ticks of a motion, with the time to settle."""
     return int(np.ceil((trajectory.duration_s + SETTLING_S) / world.config.timeStep)) + 1
 
 
-def foresee_in(world: World, group: Group, trajectory: Trajectory) -> Foreseen:
+def foresee_in(world: World, group: Group, trajectory: PlannedTrajectory) -> Foreseen:
     """Executes a motion in a fork of a world; the world itself does not change.
 
     Raises:
@@ -106,6 +106,6 @@ def foresee_in(world: World, group: Group, trajectory: Trajectory) -> Foreseen:
     return found
 
 
-def execute(world: World, robots: list[str], trajectory: Trajectory, group: Group) -> Foreseen:
+def execute(world: World, robots: list[str], trajectory: PlannedTrajectory, group: Group) -> Foreseen:
     """Executes a motion in a world as `foresee_in` does in a fork, and returns what happened."""
     return run(world, inputs_of(world, group, trajectory), robots, ticks_of(world, trajectory))

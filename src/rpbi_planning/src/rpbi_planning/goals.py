@@ -41,7 +41,7 @@ class GoalStates(NamedTuple):
     message: str = ""
 
 
-class Goal(ABC):
+class PlanningGoal(ABC):
     """A goal of one robot."""
 
     @abstractmethod
@@ -64,7 +64,7 @@ class Goal(ABC):
 
 
 @dataclass(frozen=True)
-class JointGoal(Goal):
+class JointGoal(PlanningGoal):
     """Joint positions.
 
     Attributes:
@@ -76,7 +76,7 @@ class JointGoal(Goal):
     def states(
         self, scene: PlanningScene, robot: SceneRobot, moving: Sequence[int], start: Array, seed: int
     ) -> GoalStates:
-        """See `Goal`."""
+        """See `PlanningGoal`."""
         wanted = robot.vector(self.positions, "goal")
         if isinstance(self.positions, Mapping):
             given = [name in self.positions for name in robot.model.joint_names]
@@ -92,7 +92,7 @@ class JointGoal(Goal):
 
 
 @dataclass(frozen=True)
-class NamedGoal(Goal):
+class NamedGoal(PlanningGoal):
     """A posture of `SceneRobot.postures`, such as `start`.
 
     Attributes:
@@ -104,7 +104,7 @@ class NamedGoal(Goal):
     def states(
         self, scene: PlanningScene, robot: SceneRobot, moving: Sequence[int], start: Array, seed: int
     ) -> GoalStates:
-        """See `Goal`."""
+        """See `PlanningGoal`."""
         if self.name not in robot.postures:
             raise UnknownNameError("posture", self.name, robot.postures)
         wanted = start.copy()
@@ -113,7 +113,7 @@ class NamedGoal(Goal):
 
 
 @dataclass(frozen=True)
-class PoseGoal(Goal):
+class PoseGoal(PlanningGoal):
     """A pose of a link in the world.
 
     Attributes:
@@ -136,13 +136,13 @@ class PoseGoal(Goal):
     def states(
         self, scene: PlanningScene, robot: SceneRobot, moving: Sequence[int], start: Array, seed: int
     ) -> GoalStates:
-        """See `Goal`."""
+        """See `PlanningGoal`."""
         tolerances = (self.position_tolerance,) * 3, (self.orientation_tolerance,) * 3
         return _solved(robot, self.link, [self.pose], *tolerances, moving, start, seed)
 
 
 @dataclass(frozen=True)
-class RegionGoal(Goal):
+class RegionGoal(PlanningGoal):
     """A box in which the origin of a link has to be.
 
     Attributes:
@@ -164,7 +164,7 @@ class RegionGoal(Goal):
     def states(
         self, scene: PlanningScene, robot: SceneRobot, moving: Sequence[int], start: Array, seed: int
     ) -> GoalStates:
-        """See `Goal`."""
+        """See `PlanningGoal`."""
         generator = random.Random(seed)
         x, y, z = self.size
         places = [(0.0, 0.0, 0.0)] + [
@@ -176,16 +176,16 @@ class RegionGoal(Goal):
         return _solved(robot, self.link, poses, small, angles, moving, start, seed)
 
 
-GOALS: dict[str, type[Goal]] = {"joints": JointGoal, "pose": PoseGoal, "region": RegionGoal, "named": NamedGoal}
+GOALS: dict[str, type[PlanningGoal]] = {"joints": JointGoal, "pose": PoseGoal, "region": RegionGoal, "named": NamedGoal}
 
 
-def goal_from(data: Mapping[str, Any]) -> Goal:
+def goal_from(data: Mapping[str, Any]) -> PlanningGoal:
     """Makes a goal from a mapping, such as `{type: pose, link: panda_hand, pose: {position: [0.4, 0, 0.5]}}`.
 
     Raises:
         ValueError: If the type or a key is unknown, or a value is invalid; the message names the key.
     """
-    found: Goal = built(GOALS, "goal", data)
+    found: PlanningGoal = built(GOALS, "goal", data)
     return found
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from custom_ros_tools.transforms import Array
 
-from .collision import CollisionModel, Group, Motion
+from .collision import CollisionModel, Group, JointMotion
 from .scene import PlanningScene
 
 SHARE = 0.5
@@ -16,23 +16,23 @@ SHARE = 0.5
 
 
 class RestOfMotion:
-    """The part of a motion after a time, from time 0 on; see `Motion`.
+    """The part of a motion after a time, from time 0 on; see `JointMotion`.
 
     Args:
         motion: The whole motion.
         from_s: Time at which the part begins [s].
     """
 
-    def __init__(self, motion: Motion, from_s: float) -> None:
+    def __init__(self, motion: JointMotion, from_s: float) -> None:
         self._motion, self._from_s = motion, from_s
         self.duration = motion.duration - from_s
 
     def at(self, times: Array) -> Array:
-        """See `Motion`."""
+        """See `JointMotion`."""
         return self._motion.at(times + self._from_s)
 
     def variation(self, start: Array, end: Array) -> Array:
-        """See `Motion`."""
+        """See `JointMotion`."""
         return self._motion.variation(start + self._from_s, end + self._from_s)
 
 
@@ -52,12 +52,15 @@ class PathCheck:
         self.scene = scene
         self._robot, self._joint_names = robot, tuple(joint_names)
         self._model: CollisionModel | None = None
+        self._version = -1
+        """Version of the scene for which the model was made."""
 
-    def first_meeting(self, motion: Motion, from_s: float = 0.0) -> str:
+    def first_meeting(self, motion: JointMotion, from_s: float = 0.0) -> str:
         """Returns the shapes that come too near to each other after a time [s], as text; empty if there are none."""
-        if self._model is None or self._model.scene is not self.scene or self._model.version != self.scene.version:
+        if self._model is None or self._model.scene is not self.scene or self._version != self.scene.version:
             self._model = CollisionModel(self.scene, Group(self.scene, [self._robot], self._joint_names))
             self._model.set_paddings(SHARE * self._model.padding)
+            self._version = self.scene.version
         else:
             self._model.update()
         rest = RestOfMotion(motion, min(from_s, motion.duration))

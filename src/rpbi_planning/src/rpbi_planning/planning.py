@@ -18,12 +18,12 @@ from safe_robot.limits import MotionLimits
 from .certify import certified
 from .collision import CollisionModel, Group, Meeting, collision_model
 from .constraints import BoundConstraint, PathConstraint
-from .goals import Goal
+from .goals import PlanningGoal
 from .planner import PlanningProblem, length
 from .planners import PLANNERS
 from .scene import PlanningScene
 from .shortening import shortened
-from .timing import JointLimits, PathTiming, Trajectory
+from .timing import PathTiming, PlannedTrajectory, TimingLimits
 
 if TYPE_CHECKING:
     from rpbi.world import World
@@ -57,33 +57,35 @@ class PlanResult:
         planner: Name of the planner that found the path; `straight` if the straight motion to the goal is free.
         times_s: Time of each step: goals, planning, shortening, timing, checking, foreseeing [s].
         foreseen: What happens in a fork of the world; None if that was not asked for.
+        processor_s: Processor time of each step [s], which is less than `times_s` on a busy computer.
     """
 
     success: bool
     message: str
     joint_names: tuple[str, ...]
     path: Array
-    trajectory: Trajectory | None = None
+    trajectory: PlannedTrajectory | None = None
     planner: str = ""
     times_s: Mapping[str, float] = field(default_factory=dict)
     foreseen: Foreseen | None = None
+    processor_s: Mapping[str, float] = field(default_factory=dict)
 
 
 class _Clock:
     def __init__(self) -> None:
-        self.times_s: dict[str, float] = {}
-        self._last = time.perf_counter()
+        self.times_s, self.processor_s = dict[str, float](), dict[str, float]()
+        self._last = time.perf_counter(), time.thread_time()
 
     def note(self, step: str) -> None:
-        now = time.perf_counter()
-        self.times_s[step] = self.times_s.get(step, 0.0) + now - self._last
+        now = time.perf_counter(), time.thread_time()
+        self.times_s[step], self.processor_s[step] = (b - a for a, b in zip(self._last, now))
         self._last = now
 
 
 def plan(
     scene: PlanningScene,
     robot: str | Sequence[str],
-    goal: Goal | Mapping[str, Goal],
+    goal: PlanningGoal | Mapping[str, PlanningGoal],
     *,
     start: Mapping[str, float] | Sequence[float] | None = None,
     group: Sequence[str] | None = None,
@@ -170,7 +172,7 @@ class _Plan:
     def run(
         self,
         full: Sequence[Array],
-        goal: Goal | Mapping[str, Goal],
+        goal: PlanningGoal | Mapping[str, PlanningGoal],
         constraints: Sequence[PathConstraint],
         planner: str,
         time_limit_s: float,
@@ -209,14 +211,14 @@ class _Plan:
             path = shortened(path, model, time.monotonic() + shorten_s, self._seed, self._is_cancelled)
         self._clock.note("shortening")
         scales = (share * speed**power for power, share in enumerate(RESERVE, 1))
-        limits = JointLimits(*(scale * each for scale, each in zip(scales, group.motion_limits)))
+        limits = TimingLimits(*(scale * each for scale, each in zip(scales, group.motion_limits)))
         timing = PathTiming(group.joint_names, path, limits)
         trajectory = timing.stop_until(model.first_unproven)
         self._clock.note("timing")
         if (at := model.first_unproven(trajectory)) is not None:
             return self._failed(f"the timed motion is not proven to be free at {at:.3f} s")
         if certify:
-            trajectory, reason = certified(scene, group, timing)
+            trajectory, reason = certified(scene, group, timing, 0.0 if model.is_lowered else scene.padding_m)
             if reason:
                 self._clock.note("checking")
                 return self._failed(f"the guard's checks refuse the motion: {reason}")
@@ -230,11 +232,28 @@ class _Plan:
             foreseen = foresee_in(foresee, group, trajectory)
             self._clock.note("foreseeing")
         words = f"{len(path)} waypoints, length {length(path):.2f}, {trajectory.duration_s:.2f} s"
-        return PlanResult(True, words, group.joint_names, path, trajectory, used, self._clock.times_s, foreseen)
+        return PlanResult(
+            True,
+            words,
+            group.joint_names,
+            path,
+            trajectory,
+            used,
+            self._clock.times_s,
+            foreseen,
+            self._clock.processor_s,
+        )
 
     def _failed(self, message: str) -> PlanResult:
         names = self._group.joint_names
-        return PlanResult(False, message, names, np.empty((0, len(names))), times_s=self._clock.times_s)
+        return PlanResult(
+            False,
+            message,
+            names,
+            np.empty((0, len(names))),
+            times_s=self._clock.times_s,
+            processor_s=self._clock.processor_s,
+        )
 
     def _outside(self, start: Array) -> str:
         group = self._group
@@ -278,7 +297,7 @@ class _Plan:
         model: CollisionModel,
         full: Sequence[Array],
         start: Array,
-        goal: Goal | Mapping[str, Goal],
+        goal: PlanningGoal | Mapping[str, PlanningGoal],
         bound: Sequence[BoundConstraint],
     ) -> tuple[Array, str]:
         """Returns configurations of the goal that are free, the nearest first, or a reason."""

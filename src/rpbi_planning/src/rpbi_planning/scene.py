@@ -186,17 +186,38 @@ class PlanningScene:
     @classmethod
     def of_world(cls, world: World, **options: float) -> PlanningScene:
         """Returns the robots and bodies of a world in their present states. Soft and visual bodies are left out."""
-        from .world_scene import fill
-
         scene = cls(**options)
-        fill(scene, world)
+        scene.update(world)
         return scene
 
     def update(self, world: World) -> None:
-        """Takes poses, joint positions, new and removed bodies from a world. Held bodies stay held."""
-        from .world_scene import fill
+        """Takes poses, joint positions, new and removed bodies from a world. Held bodies stay held.
 
-        fill(self, world)
+        Raises:
+            ConfigError: If a body has a shape that cannot be checked, or a robot is scaled.
+        """
+        from .world_scene import WorldRobot, contents_of
+
+        seen = set[str]()
+        for each in contents_of(world):
+            seen.add(each.name)
+            if isinstance(each, WorldRobot):
+                is_new = each.name not in self.robots
+                if is_new:
+                    self.add_robot(each.name, each.urdf, each.base)
+                self.place(each.name, each.base)
+                robot = self.robots[each.name]
+                robot.positions = np.array([each.positions.get(joint, 0.0) for joint in robot.model.joint_names])
+                if is_new:
+                    robot.postures["start"] = robot.positions.copy()
+            elif each.name in self.held:
+                continue
+            elif each.name in self.bodies and len(self.bodies[each.name]) == len(each.shapes):
+                self.place(each.name, each.pose)
+            else:
+                self.add(each.shapes, each.name, each.pose)
+        for name in [name for name in self.names if name not in seen]:
+            self.remove(name)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ CLOSE = 1e-9
 """Waypoints that differ by less than this count as one [rad or m]."""
 
 
-class Trajectory:
+class PlannedTrajectory:
     """A motion of n joints with piecewise constant jerk, at rest at both ends.
 
     Args:
@@ -49,7 +49,7 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """The same as `duration_s`, as a `Motion` for proofs."""
+        """The same as `duration_s`, as a `JointMotion` for proofs."""
         return self.duration_s
 
     def at(self, times: float | Array) -> Array:
@@ -68,7 +68,7 @@ class Trajectory:
         return velocity
 
     def variation(self, start: Array, end: Array) -> Array:
-        """Returns upper bounds on the joint motion between k pairs of times, k x n [rad or m]; see `Motion`.
+        """Returns upper bounds on the joint motion between k pairs of times, k x n [rad or m]; see `JointMotion`.
 
         Between two knots, the velocity of each joint is monotone, so that its largest absolute value is at one of both.
         """
@@ -88,10 +88,10 @@ class Trajectory:
         count = int(np.ceil(self.duration_s / period_s - 1e-9))
         return self.at(np.append(np.arange(count) * period_s, self.duration_s))
 
-    def slower(self, factor: float) -> Trajectory:
+    def slower(self, factor: float) -> PlannedTrajectory:
         """Returns the same motion with `factor` times the duration."""
         scale = np.array((1.0, factor, factor**2, factor**3))[None, :, None]
-        return Trajectory(self.joint_names, self._knots * factor, self._states / scale, self._end)
+        return PlannedTrajectory(self.joint_names, self._knots * factor, self._states / scale, self._end)
 
     def _sampled(self, times: Array) -> tuple[Array, Array, Array, Array]:
         if len(self._knots) < 2:
@@ -109,7 +109,7 @@ class Trajectory:
         return found[0], found[1], found[2], found[3]
 
 
-class JointLimits(NamedTuple):
+class TimingLimits(NamedTuple):
     """Limits of n joints: velocity, acceleration and jerk, shape (n,) each."""
 
     velocity: Array
@@ -133,7 +133,7 @@ class _Blend(NamedTuple):
         return 2.0 * self.ramp_s + self.flat_s
 
     @classmethod
-    def of(cls, change: Array, limits: JointLimits) -> _Blend:
+    def of(cls, change: Array, limits: TimingLimits) -> _Blend:
         """Returns the shortest blend in which all joints change their velocities by `change` within the limits."""
         size = np.abs(change)
         least, product = float((size / limits.acceleration).max()), float((size / limits.jerk).max())
@@ -156,7 +156,7 @@ class PathTiming:
         trajectory: The timed motion.
     """
 
-    def __init__(self, joint_names: Sequence[str], path: Array, limits: JointLimits) -> None:
+    def __init__(self, joint_names: Sequence[str], path: Array, limits: TimingLimits) -> None:
         self._joint_names, self._path, self._limits = tuple(joint_names), _distinct(path), limits
         self._stops = {0, len(self._path) - 1}
         self._make()
@@ -170,7 +170,7 @@ class PathTiming:
         self._make()
         return True
 
-    def stop_until(self, first_fault: Callable[[Trajectory], float | None]) -> Trajectory:
+    def stop_until(self, first_fault: Callable[[PlannedTrajectory], float | None]) -> PlannedTrajectory:
         """Stops at corners until a function finds no fault, or no rounded corner is left; returns the motion.
 
         Args:
@@ -184,11 +184,10 @@ class PathTiming:
         path, ordered = self._path, sorted(self._stops)
         if len(path) < 2:
             nothing = np.empty((0, 4, path.shape[1]))
-            self.trajectory, self._corners = Trajectory(self._joint_names, np.zeros(1), nothing, path[-1]), [0.0]
+            self.trajectory, self._corners = PlannedTrajectory(self._joint_names, np.zeros(1), nothing, path[-1]), [0.0]
             return
         parts = [_rounded(path[a : b + 1], self._limits) for a, b in zip(ordered, ordered[1:])]
-        self.trajectory, ends = _joined(self._joint_names, path, parts)
-        self._corners = [at for part in ends for at in part]
+        self.trajectory, self._corners = _joined(self._joint_names, path, parts)
 
 
 def _distinct(path: Array) -> Array:
@@ -207,7 +206,7 @@ class _Part(NamedTuple):
     blends: list[_Blend]
 
 
-def _rounded(path: Array, limits: JointLimits) -> _Part:
+def _rounded(path: Array, limits: TimingLimits) -> _Part:
     steps = np.diff(path, axis=0)
     spans = (np.abs(steps) / limits.velocity).max(axis=1)
     still = np.zeros((1, path.shape[1]))
@@ -222,16 +221,17 @@ def _rounded(path: Array, limits: JointLimits) -> _Part:
         spans = np.where(short, spans * GROWTH, spans)
 
 
-def _joined(joint_names: Sequence[str], path: Array, parts: Sequence[_Part]) -> tuple[Trajectory, list[list[float]]]:
+def _joined(
+    joint_names: Sequence[str], path: Array, parts: Sequence[_Part]
+) -> tuple[PlannedTrajectory, list[list[float]]]:
     """Makes one motion of all parts, and returns the times of the waypoints by part."""
     knots, states, q, now = list[float](), list[Array](), path[0].astype(float), 0.0
-    corners, first = list[list[float]](), 0
+    corners, first = list[float](), 0
     for part in parts:
         n = len(q)
         v = np.zeros(n)
         times = now + part.blends[0].duration_s / 2.0 + np.concatenate(((0.0,), np.cumsum(part.spans)))
-        begin = 0 if not corners else 1
-        corners.append(times[begin:].tolist())
+        corners += times[1 if corners else 0 :].tolist()
         q = path[first].astype(float)
         velocities = np.concatenate((part.velocities, np.zeros((1, n))))
         for number, blend in enumerate(part.blends):
@@ -260,4 +260,4 @@ def _joined(joint_names: Sequence[str], path: Array, parts: Sequence[_Part]) -> 
                     now = begin_next
         first += len(part.spans)
     knots.append(now)
-    return Trajectory(joint_names, np.array(knots), np.array(states), path[-1].astype(float)), corners
+    return PlannedTrajectory(joint_names, np.array(knots), np.array(states), path[-1].astype(float)), corners

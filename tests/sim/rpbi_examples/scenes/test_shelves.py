@@ -54,7 +54,7 @@ def test_home_is_free_and_the_lane_is_blocked_near_the_arm():
 
 
 def test_arm_goes_to_the_end_and_back_if_carriages_are_far():
-    found = visit(scene_with(lower_carriage=-0.9, upper_carriage=-0.9), 1000)
+    found = visit(scene_with(lower_carriage=-1.1, upper_carriage=-1.1), 1000)
     assert max(found) == pytest.approx(IN_FRONT[1]) and found[-1] == pytest.approx(HOME[1])
 
 
@@ -64,12 +64,12 @@ def test_arm_waits_while_a_carriage_is_in_its_lane():
 
 
 def test_arm_retreats_from_a_carriage_that_comes():
-    scene = scene_with(lower_carriage=-0.9, upper_carriage=-0.9)
+    scene = scene_with(lower_carriage=-1.1, upper_carriage=-1.1)
     names = [f"joint_{i}" for i in range(7)]
     arm = YieldingArm(scene, "left", names, blocking("left"), CYCLE_S)
     times = np.linspace(0.0, 2.0, 41)
     trajectory = SimpleNamespace(times=times, positions=HOME + np.outer(times / 2.0, IN_FRONT - HOME))
-    places, at = [], -0.9
+    places, at = [], -1.1
     for _, _ in zip(range(2000), arm.visit(trajectory, 1000.0)):
         places.append(scene.take_changes()[-1].value["joint_1"])
         if max(places) > IN_FRONT[1] - 1e-6:

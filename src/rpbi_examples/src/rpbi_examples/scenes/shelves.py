@@ -36,7 +36,7 @@ NEAR_M, NEAR_RAD = 0.01, math.radians(3.0)
 STAY_S, CYCLE_S = 0.3, 0.02
 """Time for which an arm stays at a goal, and duration of a cycle [s]."""
 RAILS = tuple(
-    Rail(name, "rail_joint", (0.6, 0.0, height), 0.9, (0.1, 0.14, 0.14), 0.1)
+    Rail(name, "rail_joint", (0.6, 0.0, height), 1.1, (0.1, 0.14, 0.14), 0.1)
     for name, height in (("lower_carriage", 0.8), ("upper_carriage", 1.18))
 )
 OPTIONS = {"planner": "projected", "time_limit_s": 60.0, "shorten_s": 60.0, "certify": False}
@@ -54,7 +54,7 @@ class Shelves(Scene):
     watch = Watched(robots=(*BASES, *(rail.robot for rail in RAILS)), contacts=tuple(BASES))
     others = tuple(rail.robot for rail in RAILS)
     of = GOALS * len(BASES)
-    longest_s = 150.0
+    longest_s = 180.0
 
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)

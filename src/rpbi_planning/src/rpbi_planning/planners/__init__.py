@@ -7,9 +7,9 @@ PLANNERS: PluginTable[Planner] = PluginTable(
     "planner",
     "rpbi_planning.planner:Planner",
     {
-        "rrt_connect": "rpbi_planning.planners.sampling:RrtConnect",
-        "aorrtc": "rpbi_planning.planners.sampling:Aorrtc",
-        "bit_star": "rpbi_planning.planners.sampling:BitStar",
+        "rrt_connect": "rpbi_planning.planners.rrt_connect:RrtConnect",
+        "aorrtc": "rpbi_planning.planners.aorrtc:Aorrtc",
+        "bit_star": "rpbi_planning.planners.bit_star:BitStar",
         "prm": "rpbi_planning.planners.prm:Prm",
         "projected": "rpbi_planning.planners.projected:ProjectedRrt",
     },

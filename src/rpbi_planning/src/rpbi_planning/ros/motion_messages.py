@@ -16,7 +16,7 @@ from custom_ros_tools.ros.joint_states import values_in
 from robot_model.geometry import Pose, normalized
 from rpbi.ros.headers import world_frame
 from rpbi_planning.constraints import PathConstraint, constraint_from
-from rpbi_planning.goals import Goal, JointGoal, NamedGoal, PoseGoal, goal_from
+from rpbi_planning.goals import JointGoal, NamedGoal, PlanningGoal, PoseGoal, goal_from
 from rpbi_planning.msg import MotionRequest
 
 from .scene_topics import SceneTopics
@@ -26,7 +26,7 @@ MAX_TEXT = 20_000
 GOALS = "joints, named, pose or goal"
 
 
-def goal_in(request: MotionRequest, topics: SceneTopics) -> Goal:
+def goal_in(request: MotionRequest, topics: SceneTopics) -> PlanningGoal:
     """Returns the goal of a request.
 
     Args:

@@ -296,15 +296,19 @@ class MotionServices:
         self._markers.hide_ghost()
         _, present = self._topics.state(robot)
         client.start(result.joint_names, result.trajectory, present)
-        while not client.wait(1.0 / self._config.check_hz):
-            elapsed_s, duration_s = client.elapsed_s, result.trajectory.duration_s
-            report(MoveRobotFeedback(MOVING, elapsed_s / duration_s, duration_s - elapsed_s, plans))
-            reason = "cancelled" if is_cancelled() else self._obstacle(planned, check, elapsed_s)
-            if reason:
-                rospy.logwarn("%s: stops: %s", robot.name, reason)
-                report(MoveRobotFeedback(STOPPING, elapsed_s / duration_s, 0.0, plans))
-                client.stop()
-                return reason
+        try:
+            while not client.wait(1.0 / self._config.check_hz):
+                elapsed_s, duration_s = client.elapsed_s, result.trajectory.duration_s
+                report(MoveRobotFeedback(MOVING, elapsed_s / duration_s, duration_s - elapsed_s, plans))
+                reason = "cancelled" if is_cancelled() else self._obstacle(planned, check, elapsed_s)
+                if reason:
+                    rospy.logwarn("%s: stops: %s", robot.name, reason)
+                    report(MoveRobotFeedback(STOPPING, elapsed_s / duration_s, 0.0, plans))
+                    client.stop()
+                    return reason
+        except Exception:
+            client.stop()  # no motion without checks
+            raise
         if client.fault:
             raise InterfaceError(client.fault)
         return None

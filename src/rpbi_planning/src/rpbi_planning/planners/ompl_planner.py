@@ -1,4 +1,4 @@
-"""Planners of OMPL, the Open Motion Planning Library (Sucan, Moll and Kavraki, 2012)."""
+"""Common part of the planners of OMPL, the Open Motion Planning Library (Sucan, Moll and Kavraki, 2012)."""
 
 from __future__ import annotations
 
@@ -93,23 +93,3 @@ class OmplPlanner(Planner):
         if not definition.hasExactSolution():
             return None
         return np.array([state[0:n] for state in definition.getSolutionPath().getStates()])
-
-
-class RrtConnect(OmplPlanner):
-    """RRT-Connect: two trees, from the start and from the goals, that grow towards each other; the first path."""
-
-    method = "RRTConnect"
-
-
-class Aorrtc(OmplPlanner):
-    """AORRTC: repeats RRT-Connect with bounds on the cost; the path gets shorter until the time is up."""
-
-    method = "AORRTC"
-    improves = True
-
-
-class BitStar(OmplPlanner):
-    """BIT*: searches batches of samples in the order of the expected length; better paths until the time is up."""
-
-    method = "BITstar"
-    improves = True
