@@ -17,7 +17,7 @@ from rpbi_reality.evaluation import world_file
 from rpbi_reality.identification.candidate import CandidateWorld, WorldTemplate
 from rpbi_reality.identification.fit_config import FitConfig
 from rpbi_reality.identification.identify import identify_world, write_results
-from rpbi_reality.identification.recordings import PoseTrack, Recording
+from rpbi_reality.identification.recordings import MeasuredRun, PoseTrack
 
 TABLE = {
     "name": "table",
@@ -74,7 +74,7 @@ def motion(world, tmp_path) -> Path:
     time, random = np.arange(0.0, 0.6, 0.01), np.random.default_rng(3)
     track = PoseTrack(time, np.zeros((60, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (60, 1)))
     candidate = CandidateWorld(WorldTemplate(world, fit()), {"friction": 0.35, "delay": 0.01})
-    rows = candidate.simulate(Recording("0", {"box": track}), 1.0).signals["box"]
+    rows = candidate.simulate(MeasuredRun("0", {"box": track}), 1.0).signals["box"]
     candidate.close()
     poses = np.concatenate([rows] * 3)
     poses[:, :3] += random.normal(0.0, 0.001, (180, 3))
@@ -91,7 +91,7 @@ def test_known_values_are_within_five_percent_and_within_their_intervals(world, 
     assert len(result.held_out) == 1
 
 
-def test_one_seed_leads_to_equal_files_with_any_number_of_processes(world, motion, tmp_path):
+def test_one_seed_leads_to_equal_files_with_any_processes(world, motion, tmp_path):
     config = fit(method="cmaes", objective="mean_error", evaluations=30)
     for jobs in (1, 2):
         write_results(tmp_path / f"out{jobs}", world, config, identify_world(world, motion, config, jobs))

@@ -65,14 +65,14 @@ def _rebound(main: dict, height: float) -> float:
         world.close()
 
 
-def test_rebound_with_the_preset_does_not_depend_on_the_place_in_the_tick():
+def test_rebound_with_the_preset_does_not_depend_on_the_tick():
     heights = 0.6 + 0.00037 * np.arange(6)
     assert [_rebound({"contact_preset": "bounce"}, height) for height in heights] == pytest.approx([1.0] * 6, abs=0.03)
     plain = [_rebound({"timeStep": 0.001}, height) for height in heights]
     assert max(plain) - min(plain) > 0.1
 
 
-def test_body_turns_about_its_centre_of_mass_and_reports_the_pose_of_its_frame():
+def test_body_turns_about_its_centre_of_mass():
     world = _world({"timeStep": 0.001})
     try:
         spin = {"angularVelocity": [0.0, 0.0, 2.0]}

@@ -24,7 +24,7 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
 class ContactFriction(ConfigModel):
-    """Friction that depends on the number of contact points that share the load, as that of plastics does."""
+    """Friction that depends on how many contact points share the load, as that of plastics depends on pressure."""
 
     edge: NonNegative = Field(description="Coulomb friction coefficient while the object has two contact points.")
     face: NonNegative = Field(description="Coulomb friction coefficient while it has three contact points or more.")

@@ -12,7 +12,7 @@ from rpbi_data.bags.bag_reader import bag_to_dataframes
 
 from ..pose_errors import unit_quaternions
 from .fit_config import FitConfig
-from .recordings import JointTrack, PoseTrack, Recording
+from .recordings import JointTrack, MeasuredRun, PoseTrack
 
 _POSES = {
     "pose/pose": ("position", "orientation"),
@@ -32,7 +32,7 @@ def signal_of(topic: str) -> str:
     return "/".join(parts)
 
 
-def read_bag(path: Path, config: FitConfig) -> Recording:
+def read_bag(path: Path, config: FitConfig) -> MeasuredRun:
     """Reads the signals of a bag; the run starts when all measured signals have started.
 
     Raises:
@@ -63,7 +63,7 @@ def read_bag(path: Path, config: FitConfig) -> Recording:
                 time = np.maximum(table.index.to_numpy(float) - start_s, 0.0)
                 last = np.append(np.diff(time) > 0.0, True)  # of the targets before the start, the newest counts
                 inputs[name] = JointTrack(time[last], names, positions[last])
-    return Recording(path.stem, poses, joints, inputs)
+    return MeasuredRun(path.stem, poses, joints, inputs)
 
 
 def _joints(table: pd.DataFrame) -> tuple[tuple[str, ...], np.ndarray]:

@@ -13,10 +13,10 @@ import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from robot_model.asset_files import find_file, find_folder
+from robot_model.geometry import Pose
 from rpbi.bodies.dynamic import DynamicObjectConfig
 from rpbi.config.object_entry import parse_object_entry
 from rpbi.config.pybullet_models import ResetBaseVelocity
-from rpbi.geometry import Pose
 from rpbi.world import World
 from rpbi.world.file_kinds import load_main_file, load_object_file
 from rpbi.world.loading import LoadedWorld, load_world, load_world_dict
@@ -24,7 +24,7 @@ from rpbi.world.objects import object_sections
 
 from ..pose_errors import angle_deg, rotated
 from .fit_config import FitConfig, SignalConfig
-from .recordings import JointTrack, PoseTrack, Recording
+from .recordings import JointTrack, MeasuredRun, PoseTrack
 
 _PART = re.compile(r"([A-Za-z0-9_]+)((?:\[\d+\])*)")
 
@@ -201,7 +201,7 @@ class CandidateWorld:
         """Disconnects from PyBullet."""
         self.world.close()
 
-    def simulate(self, run: Recording, end_s: float) -> SimulatedRun:
+    def simulate(self, run: MeasuredRun, end_s: float) -> SimulatedRun:
         """Simulates a run.
 
         Args:
@@ -233,7 +233,7 @@ class CandidateWorld:
         self._last = key, result
         return result
 
-    def _begin(self, run: Recording) -> None:
+    def _begin(self, run: MeasuredRun) -> None:
         world = self.world
         world.reset()
         for signal, start in run.starts.items():
@@ -263,13 +263,13 @@ class CandidateWorld:
         for target, change in changes.items():
             world.change_dynamics(target, change)
 
-    def _times(self, run: Recording, signal: str, end_s: float) -> np.ndarray:
+    def _times(self, run: MeasuredRun, signal: str, end_s: float) -> np.ndarray:
         track: PoseTrack | JointTrack | None = run.poses.get(signal) or run.joints.get(signal)
         assert track is not None
         delay_s = self._measured.get(f"{signal}.delay_s", 0.0) - self._config.start_s
         return np.maximum(track.time[track.time <= end_s + 1e-9] - delay_s, 0.0)
 
-    def _inputs(self, run: Recording) -> list[tuple[int, str, dict[str, float]]]:
+    def _inputs(self, run: MeasuredRun) -> list[tuple[int, str, dict[str, float]]]:
         """Returns tick, slot and target of each changed input of a run, the latest tick first."""
         found = []
         for slot, track in run.inputs.items():
@@ -295,7 +295,7 @@ class CandidateWorld:
         if not world.run_idle(until - world.clock.tick, math.inf):
             world.step()
 
-    def _read(self, run: Recording, signal: str) -> np.ndarray:
+    def _read(self, run: MeasuredRun, signal: str) -> np.ndarray:
         config = self._config.measured[signal]
         if signal in run.joints:
             body: Any = self.world.bodies[config.object]

@@ -14,7 +14,7 @@ from custom_ros_tools.errors import ConfigError, InterfaceError
 
 from .candidate import CandidateWorld, WorldTemplate, mean_error, residuals
 from .fit_config import FitConfig
-from .recordings import Recording
+from .recordings import MeasuredRun
 
 DIVERGED = 1e3
 """Error of a run whose simulation diverges, as a multiple of the standard deviations."""
@@ -42,7 +42,7 @@ class _Job(NamedTuple):
     path: str
     config: FitConfig
     robot_description: str | None
-    runs: list[Recording]
+    runs: list[MeasuredRun]
 
 
 _job: _Job | None = None
@@ -59,7 +59,7 @@ def _evaluate(task: tuple[Mapping[str, float], Sequence[int]]) -> Evaluation:
     return _of_runs(_template, task[0], [_job.runs[index] for index in task[1]])
 
 
-def _of_runs(template: WorldTemplate, values: Mapping[str, float], runs: Sequence[Recording]) -> Evaluation:
+def _of_runs(template: WorldTemplate, values: Mapping[str, float], runs: Sequence[MeasuredRun]) -> Evaluation:
     config, problems = template.config, []
     try:
         world = CandidateWorld(template, values)
@@ -80,7 +80,7 @@ def _of_runs(template: WorldTemplate, values: Mapping[str, float], runs: Sequenc
     return Evaluation(np.array(errors), rows, tuple(dict.fromkeys(problems)))
 
 
-def _of_run(config: FitConfig, world: CandidateWorld, run: Recording) -> tuple[float, np.ndarray]:
+def _of_run(config: FitConfig, world: CandidateWorld, run: MeasuredRun) -> tuple[float, np.ndarray]:
     end_s = min(run.end_s, config.end_s or run.end_s)
     simulated = world.simulate(run, end_s).signals
     tracks = {signal: run.poses.get(signal) or run.joints.get(signal) for signal in config.measured}
@@ -94,7 +94,7 @@ def _of_run(config: FitConfig, world: CandidateWorld, run: Recording) -> tuple[f
     return float((scaled**2).sum()), scaled
 
 
-def _far(config: FitConfig, run: Recording) -> np.ndarray:
+def _far(config: FitConfig, run: MeasuredRun) -> np.ndarray:
     """Returns residuals of a run that could not be simulated."""
     if config.objective == "mean_error":
         return np.zeros(0)
@@ -119,7 +119,7 @@ class Evaluator:
     """
 
     def __init__(
-        self, path: str, config: FitConfig, runs: list[Recording], robot_description: str | None, jobs: int
+        self, path: str, config: FitConfig, runs: list[MeasuredRun], robot_description: str | None, jobs: int
     ) -> None:
         self._job = _Job(path, config, robot_description, runs)
         self._jobs = jobs

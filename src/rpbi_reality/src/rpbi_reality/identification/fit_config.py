@@ -107,7 +107,7 @@ class RunsConfig(ConfigModel):
 
 
 class FitConfig(ConfigModel):
-    """What `./rpbi identify` identifies, and from which signals."""
+    """Parameters that `./rpbi identify` identifies, and the measured signals."""
 
     parameters: dict[str, ParameterConfig] = Field(description="The parameters, indexed by name.")
     measured: dict[str, SignalConfig] = Field(description="Measured signals, indexed by their names in the data.")

@@ -22,8 +22,8 @@ from .evaluator import Evaluation, Evaluator
 from .fit_config import FitConfig
 from .pictures import parameter_picture
 from .recording_files import read_recordings
-from .recordings import Recording
-from .search import Space, search
+from .recordings import MeasuredRun
+from .search import ParameterSpace, search
 from .uncertainty import Uncertainty, uncertainty
 
 DIGITS = 6
@@ -64,7 +64,7 @@ def read_fit(path: Path) -> FitConfig:
     return FitConfig.parse(load_config(str(path)), str(path))
 
 
-def chosen_runs(config: FitConfig, runs: list[Recording], file: str) -> tuple[list[int], list[int]]:
+def chosen_runs(config: FitConfig, runs: list[MeasuredRun], file: str) -> tuple[list[int], list[int]]:
     """Returns the indices of the runs from which parameters are identified, and of the held-out runs.
 
     Raises:
@@ -111,7 +111,7 @@ def identify_world(
     runs = read_recordings(data, config)
     trained, held_out = chosen_runs(config, runs, str(data))
     evaluator = Evaluator(world, config, runs, urdf, jobs)
-    space = Space(config.parameters)
+    space = ParameterSpace(config.parameters)
     first = {name: each.first for name, each in config.parameters.items()}
     with evaluator.running() as evaluate:
         found = search(config, evaluate, trained, report)

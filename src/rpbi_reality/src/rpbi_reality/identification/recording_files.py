@@ -14,13 +14,13 @@ from ..pose_errors import rotated, unit_quaternions
 from ..pushes.push_data import read_runs, times
 from ..tosses.toss_data import TossData
 from .fit_config import FitConfig
-from .recordings import BaseState, JointTrack, PoseTrack, Recording, check
+from .recordings import BaseState, JointTrack, MeasuredRun, PoseTrack, check
 
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 MAX_CSV_BYTES = 500_000_000
 
 
-def read_recordings(path: Path, config: FitConfig) -> list[Recording]:
+def read_recordings(path: Path, config: FitConfig) -> list[MeasuredRun]:
     """Reads all runs of a file.
 
     The file is an NPZ file of tosses or pushes (see docs/reality.md), or an NPZ, CSV or bag file of motion (see
@@ -56,7 +56,7 @@ def read_recordings(path: Path, config: FitConfig) -> list[Recording]:
     return runs
 
 
-def _tosses(path: Path) -> list[Recording]:
+def _tosses(path: Path) -> list[MeasuredRun]:
     data = TossData.read(path)
     runs = []
     for toss in data.tosses:
@@ -64,11 +64,11 @@ def _tosses(path: Path) -> list[Recording]:
         spin = rotated(toss.start.quaternion, toss.start.angular_velocity)
         start = BaseState(toss.start.position, toss.start.quaternion, toss.start.linear_velocity, spin)
         poses = {"cube": PoseTrack(time, toss.position, unit_quaternions(toss.quaternion))}
-        runs.append(Recording(toss.name, poses, starts={"cube": start}))
+        runs.append(MeasuredRun(toss.name, poses, starts={"cube": start}))
     return runs
 
 
-def _pushes(path: Path, config: FitConfig) -> list[Recording]:
+def _pushes(path: Path, config: FitConfig) -> list[MeasuredRun]:
     runs = []
     for run in read_runs(path):
         if config.runs.experiment in (None, run.experiment):
@@ -77,13 +77,13 @@ def _pushes(path: Path, config: FitConfig) -> list[Recording]:
                 "hand": PoseTrack(time, poses.hand_position, poses.hand_quaternion),
                 "cube": PoseTrack(time, poses.cube_position, poses.cube_quaternion),
             }
-            runs.append(Recording(run.name, tracks))
+            runs.append(MeasuredRun(run.name, tracks))
     if not runs:
         raise fault(path, "experiment", f"there is no run of experiment {config.runs.experiment}")
     return runs
 
 
-def _motion(path: Path, arrays: dict[str, np.ndarray]) -> list[Recording]:
+def _motion(path: Path, arrays: dict[str, np.ndarray]) -> list[MeasuredRun]:
     """Reads `time`, and `SIGNAL/pose`, `SIGNAL/joints` and `SLOT/input` with the names `SIGNAL/names`, `SLOT/names`."""
     if "time" not in arrays or arrays["time"].ndim != 1:
         raise fault(path, "time", f"expected times of shape (n,); the file has {', '.join(sorted(arrays))}")
@@ -111,11 +111,11 @@ def _motion(path: Path, arrays: dict[str, np.ndarray]) -> list[Recording]:
             if len(names) != array.shape[1]:
                 raise fault(path, f"{name}/names", f"expected {array.shape[1]} names of joints, got {len(names)}")
             (joints if kind == "joints" else inputs)[name] = JointTrack(when, names, values)
-        runs.append(Recording(str(number), poses, joints, inputs))
+        runs.append(MeasuredRun(str(number), poses, joints, inputs))
     return runs
 
 
-def _table(path: Path) -> Recording:
+def _table(path: Path) -> MeasuredRun:
     """Reads a CSV file with columns `time`, `SIGNAL.x` ... `SIGNAL.qw`, `SIGNAL.joint.NAME` and `SLOT.input.NAME`."""
     if path.stat().st_size > MAX_CSV_BYTES:
         raise ConfigError([Problem(str(path), "", f"expected at most {MAX_CSV_BYTES:,} bytes")])
@@ -147,4 +147,4 @@ def _table(path: Path) -> Recording:
             signal: JointTrack(time, tuple(names), np.stack([numbers[f"{signal}.{kind}.{each}"] for each in names], 1))
             for signal, names in groups.items()
         }
-    return Recording(path.stem, poses, tracks["joint"], tracks["input"])
+    return MeasuredRun(path.stem, poses, tracks["joint"], tracks["input"])

@@ -61,7 +61,7 @@ class BaseState(NamedTuple):
     angular_velocity: np.ndarray
 
 
-class Recording(NamedTuple):
+class MeasuredRun(NamedTuple):
     """A measured run, which starts at time 0.
 
     Attributes:
@@ -85,7 +85,7 @@ class Recording(NamedTuple):
         return max(float(track.time[-1]) for track in tracks)
 
 
-def check(file: str, run: Recording) -> None:
+def check(file: str, run: MeasuredRun) -> None:
     """Checks times, units and overlap of a run.
 
     Raises:

@@ -20,7 +20,7 @@ NO_EFFECT = 1e-9
 """Largest change of all errors at which nothing depends on a parameter."""
 
 
-class Space:
+class ParameterSpace:
     """Maps values of parameters to the unit cube and back.
 
     Args:
@@ -96,12 +96,12 @@ def search(
         InterfaceError: If nothing depends on a parameter, or no candidate can be simulated.
         MissingDependency: If `cmaes` is not installed.
     """
-    space = Space(config.parameters)
+    space = ParameterSpace(config.parameters)
     _refuse_without_effect(config, space, evaluate, runs)
     return (_cmaes if config.method == "cmaes" else _least_squares)(config, space, evaluate, runs, report)
 
 
-def _refuse_without_effect(config: FitConfig, space: Space, evaluate: Evaluator, runs: Sequence[int]) -> None:
+def _refuse_without_effect(config: FitConfig, space: ParameterSpace, evaluate: Evaluator, runs: Sequence[int]) -> None:
     """Raises an error that names parameters on which the errors do not depend."""
     first, few = np.clip(space.first, 0.02, 0.98), runs[: min(len(runs), 10)]
     shifted = [first + 0.25 * np.eye(len(first))[i] * (1.0 if first[i] < 0.6 else -1.0) for i in range(len(first))]
@@ -114,7 +114,7 @@ def _refuse_without_effect(config: FitConfig, space: Space, evaluate: Evaluator,
 
 
 def _least_squares(
-    config: FitConfig, space: Space, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
+    config: FitConfig, space: ParameterSpace, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
 ) -> Found:
     """Trust region reflective (Branch, Coleman and Li 1999) with the loss soft L1 over all residuals."""
     count = len(space.names)
@@ -161,7 +161,7 @@ def _least_squares(
 
 
 def _cmaes(
-    config: FitConfig, space: Space, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
+    config: FitConfig, space: ParameterSpace, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
 ) -> Found:
     """Covariance matrix adaptation evolution strategy (Hansen 2016), of the library `cmaes`."""
     try:

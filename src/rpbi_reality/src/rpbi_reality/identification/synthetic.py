@@ -11,7 +11,7 @@ from custom_ros_tools.files import atomic_file
 
 from .candidate import CandidateWorld, WorldTemplate
 from .fit_config import FitConfig
-from .recordings import JointTrack, PoseTrack, Recording
+from .recordings import JointTrack, MeasuredRun, PoseTrack
 
 
 def write_motion(
@@ -57,7 +57,7 @@ def write_motion(
                 signal: JointTrack(time, names, np.zeros((len(time), len(names)))) for signal, names in joints.items()
             }
             sent = {slot: JointTrack(time, names, _steps(time, len(names), random)) for slot, names in inputs.items()}
-            signals = candidate.simulate(Recording(str(number), poses, tracks, sent), duration_s).signals
+            signals = candidate.simulate(MeasuredRun(str(number), poses, tracks, sent), duration_s).signals
             for signal, rows in signals.items():
                 if signal in poses:
                     measured = np.hstack([rows[:, :3] + random.normal(0.0, noise_m, still[0].shape), rows[:, 3:]])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .fit_config import FitConfig
-from .search import Found, Space
+from .search import Found, ParameterSpace
 
 ROUNDS = 500
 RIDGE = 1e-3
@@ -38,26 +38,35 @@ def uncertainty(config: FitConfig, found: Found) -> Uncertainty:
     Least squares: one Gauss-Newton step from the optimum for each resample of runs. CMA-ES: for each resample, the
     minimum of a quadratic function that is fitted to the errors of the evaluated candidates.
     """
-    space = Space(config.parameters)
+    space = ParameterSpace(config.parameters)
     random = np.random.default_rng(config.seed)
     if found.jacobians:
         shifts, hessian = _gauss_newton(space, found, random)
     else:
         shifts, hessian = _surrogate(found, random)
-    units = np.clip(found.unit + shifts, 0.0, 1.0)
-    values = [space.values(each) for each in units]
-    intervals = {}
-    for name in space.names:
-        column = np.array([each[name] for each in values])
-        low, high = np.percentile(column, (2.5, 97.5))
-        intervals[name] = (float(low), float(high))
+    low, high = (_percentile(shifts, percent) for percent in (2.5, 97.5))
+    lowest, highest = (space.values(found.unit + side) for side in (low, high))
+    intervals = {name: (lowest[name], highest[name]) for name in space.names}
     spread = shifts.std(0)
     worst = np.argsort(-spread)[:2]
     profiles = {space.names[i]: _profile(space, found.unit, hessian, int(i)) for i in worst}
     return Uncertainty(intervals, profiles, _alike(space, hessian, spread))
 
 
-def _gauss_newton(space: Space, found: Found, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _percentile(shifts: np.ndarray, percent: float) -> np.ndarray:
+    """Returns a percentile of shifts; the interval includes the median, for a search that ended early.
+
+    Args:
+        shifts: Shift of the optimum for each resample, shape (rounds, m).
+        percent: The percentile; below 50, the lower end of an interval.
+    """
+    raw = np.percentile(shifts, percent, axis=0)
+    centred = raw - np.median(shifts, axis=0)
+    ends: np.ndarray = np.minimum(raw, centred) if percent < 50.0 else np.maximum(raw, centred)
+    return ends
+
+
+def _gauss_newton(space: ParameterSpace, found: Found, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     blocks = list(zip(found.residuals, found.jacobians))
     if len(blocks) < 8:  # resample blocks of time within runs
         blocks = [
@@ -83,8 +92,7 @@ def _gauss_newton(space: Space, found: Found, random: np.random.Generator) -> tu
     for _ in range(ROUNDS):
         chosen = random.integers(0, len(blocks), len(blocks))
         shifts.append(-np.linalg.solve(squares[chosen].sum(0) + prior + ridge, gradients[chosen].sum(0)))
-    steps = np.array(shifts)
-    return steps - np.median(steps, 0), full
+    return np.array(shifts), full
 
 
 def _quadratic(points: np.ndarray) -> np.ndarray:
@@ -115,13 +123,13 @@ def _surrogate(found: Found, random: np.random.Generator) -> tuple[np.ndarray, n
         step = -vectors @ ((vectors.T @ gradient) / values)
         return np.clip(step, -3.0, 3.0), (vectors * values) @ vectors.T
 
-    base, hessian = minimum(capped.mean(1))
+    _, hessian = minimum(capped.mean(1))
     runs = capped.shape[1]
     steps = np.array([minimum(capped[:, random.integers(0, runs, runs)].mean(1))[0] for _ in range(ROUNDS)])
-    return (steps - base) * scale, hessian / np.outer(scale, scale) / 2.0
+    return steps * scale, hessian / np.outer(scale, scale) / 2.0
 
 
-def _profile(space: Space, unit: np.ndarray, hessian: np.ndarray, index: int) -> list[tuple[float, float]]:
+def _profile(space: ParameterSpace, unit: np.ndarray, hessian: np.ndarray, index: int) -> list[tuple[float, float]]:
     """Returns values of a parameter, and the increase of the error with all other parameters fitted again."""
     others = [i for i in range(len(unit)) if i != index]
     curvature = hessian[index, index]
@@ -138,7 +146,7 @@ def _profile(space: Space, unit: np.ndarray, hessian: np.ndarray, index: int) ->
     return rows
 
 
-def _alike(space: Space, hessian: np.ndarray, spread: np.ndarray) -> list[tuple[str, ...]]:
+def _alike(space: ParameterSpace, hessian: np.ndarray, spread: np.ndarray) -> list[tuple[str, ...]]:
     """Returns the parameters of directions along which the error hardly changes."""
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
     values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))

@@ -44,7 +44,7 @@ PUBLISHED = MujocoSettings()
 MEASURED = MujocoSettings(
     side=0.10248, gravity=9.605, time_constant=0.01, inertia=(0.000775, 0.000775, 0.000775), centre=(0.0, 0.0, 0.0057)
 )
-IDENTIFIED = MujocoSettings(
+FITTED = MujocoSettings(
     side=0.10248,
     gravity=9.605,
     friction=0.176,
@@ -54,7 +54,7 @@ IDENTIFIED = MujocoSettings(
     centre=(0.0, 0.0, 0.007),
 )
 SETTINGS = {
-    "MuJoCo, same search": IDENTIFIED,
+    "MuJoCo, fitted to 60 of the tosses": FITTED,
     "MuJoCo, published facts": PUBLISHED,
     "MuJoCo, measured lengths, gravity and centre of mass": MEASURED,
 }
