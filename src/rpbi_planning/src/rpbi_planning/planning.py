@@ -56,7 +56,7 @@ class PlanResult:
         trajectory: The timed motion; None without success.
         planner: Name of the planner that found the path; `straight` if the straight motion to the goal is free.
         times_s: Time of each step: goals, planning, shortening, timing, checking, foreseeing [s].
-        foreseen: What happens in a fork of the world; None if that was not asked for.
+        foreseen: Effects of the motion in a fork of the world; None if they were not asked for.
         processor_s: Processor time of each step [s], which is less than `times_s` on a busy computer.
     """
 
