@@ -30,7 +30,7 @@ def world():
     made.close()
 
 
-def test_foreseen_equals_what_happens(world):
+def test_foreseen_state_is_reached(world):
     scene = PlanningScene.of_world(world)
     group = Group(scene, ["panda"], ARM)
     for number in range(2):
