@@ -32,14 +32,10 @@ DRAWN_S = 5.0
 """Time in which the page has drawn the stopped world [s]."""
 
 
-HIDE_PANEL = """(() => {
-  let part = [...document.querySelectorAll('*')].reverse().find((each) => each.textContent.trim() === 'Time line');
-  while (part && !['absolute', 'fixed'].includes(getComputedStyle(part).position)) part = part.parentElement;
-  if (part) part.style.display = 'none';
-  return Boolean(part);
-})()"""
 HALF = (600, 520)
 """Size of the picture of RViz, and of that of the browser next to it [px]."""
+PAGE_WIDTH = 1280
+"""Width of the page, of which the middle is shown: the panel is to the right of it [px]."""
 STARTS_S = 5.0
 """Simulated time at which the worlds next to each other are stopped [s]."""
 
@@ -95,7 +91,7 @@ def _draw_beside(
     distance_m = float(np.linalg.norm(away))
     orbit = {"Pitch": math.asin(away[2] / distance_m), "Yaw": math.atan2(away[1], away[0]) % (2.0 * math.pi)}
     camera = f"initialCameraPosition={','.join(map(str, eye))}&initialCameraLookAt={','.join(map(str, focus))}"
-    with Stage(*HALF) as stage, browser(*HALF) as chromium, tempfile.TemporaryDirectory() as folder:
+    with Stage(*HALF) as stage, browser(PAGE_WIDTH, HALF[1]) as chromium, tempfile.TemporaryDirectory() as folder:
         stage.launch(f"{name}.launch")
         next_message("rpbi/state", SimulationState, lambda each: each.simulated_time > STARTS_S)
         stage.stop_world()
@@ -107,8 +103,8 @@ def _draw_beside(
         tab.wait("document.body.innerText.includes('Time line')", 300.0)
         _close_warning(tab)
         time.sleep(DRAWN_S)
-        tab.wait(HIDE_PANEL)
-        page = _screenshot(tab, Path(folder))
+        left = (PAGE_WIDTH - HALF[0]) // 2
+        page = _screenshot(tab, Path(folder)).crop((left, 0, left + HALF[0], HALF[1]))
     label(rviz, "RViz", (60, 24))
     label(page, "browser", (60, 24))
     write_png(path, beside(rviz, page))
