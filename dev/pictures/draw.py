@@ -59,6 +59,7 @@ PICTURES: dict[str, str] = {
     "telepresence.png": "rviz_people:telepresence",
     "tracking.png": "rviz_people:tracking",
     "browser.png": "live_page:draw_browser",
+    "browser_demo.png": "live_page:draw_browser_demo",
     "controls.png": "windows:controls",
     "devices.png": "windows:devices",
     "live_plot.png": "windows:live_plot",
