@@ -326,8 +326,9 @@ class PlanningScene:
             ValueError: If a number is not finite, or a robot holds the body.
         """
         if name in self.robots:
-            if self.robots[name].base != pose:
-                self.robots[name].base = _checked(pose)
+            checked = _checked(pose)
+            if self.robots[name].base != checked:
+                self.robots[name].base = checked
                 self.version += 1
         elif name in self.bodies:
             if name in self.held:
