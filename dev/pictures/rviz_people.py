@@ -113,7 +113,7 @@ def teleop(path: Path) -> None:
 def human_interaction(path: Path) -> None:
     """Draws the arm that presses on the box, and the window of the virtual device with its force."""
     with Stage(760, 600) as stage, tempfile.TemporaryDirectory() as folder:
-        stage.launch("human_interaction.launch", "plot:=false", "guard:=false", f"output:={folder}")
+        stage.launch("human_interaction.launch", "plot:=false", f"output:={folder}")
         force = Newest("haptics/force", WrenchStamped)
         handle = place("^Virtual haptic device$")
         wait_until(lambda: force.message, "the device runs")
