@@ -32,7 +32,7 @@ RESTS_S = 3.0
 """Time after which the arm rests on the box, and after which RViz shows all segments of people [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
-PART_PX = 360
+PART_PX = 420
 """Rows and columns of the part of RViz's view that shows one of two worlds [px]."""
 CAMERA_YAW_RAD = -0.8
 """Direction of the camera as seen from the avatar [rad]."""
