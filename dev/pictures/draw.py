@@ -83,6 +83,7 @@ PICTURES: dict[str, str] = {
     "worlds.png": "guides:draw_worlds",
     "robot_model.png": "guides:draw_robot_model",
     "python.png": "guides:draw_python",
+    "browser_demo.png": "live_page:draw_browser_demo",
     "controls.png": "windows:controls",
     "devices.png": "windows:devices",
     "live_plot.png": "windows:live_plot",

@@ -61,7 +61,7 @@ def draw_forces(path: Path) -> None:
 def draw_press(path: Path) -> None:
     """Draws the figure that the example `human_interaction` writes after the press of the scripted hand."""
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder, Stage() as stage:
-        arguments = ("device:=scripted", "headless:=true", "guard:=false", f"output:={folder}")
+        arguments = ("device:=scripted", "headless:=true", f"output:={folder}")
         stage.launch("human_interaction.launch", *arguments).wait(PATIENCE_S)
         shutil.copyfile(Path(folder) / "human_interaction.png", path)
     give_palette(path)

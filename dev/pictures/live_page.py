@@ -1,22 +1,26 @@
-"""Picture of the live view in a real browser."""
+"""Pictures of the live view in a real browser, by itself and next to RViz."""
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 from files import write_png
+from labels import label
 from PIL import Image
+from render import beside
 from screen import Stage, next_message, wait_until
 
-from ros_pybullet_interface.msg import Contacts
+from ros_pybullet_interface.msg import Contacts, SimulationState
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "tests/support/screens"))
-from browser import Tab, browser
-from rviz_worlds import PUSH_N, push_n
+from chromium import Tab, browser
+from rviz_worlds import PUSH_N, RVIZ, push_n
 from viewer import Viewer
 
 SIZE = (1280, 880)
@@ -28,14 +32,19 @@ DRAWN_S = 5.0
 """Time in which the page has drawn the stopped world [s]."""
 
 
+HALF = (600, 520)
+"""Size of the picture of RViz, and of that of the browser next to it [px]."""
+PAGE_WIDTH = 1280
+"""Width of the page, of which the middle is shown: the panel is to the right of it [px]."""
+STARTS_S = 5.0
+"""Simulated time at which the worlds next to each other are stopped [s]."""
+
+
 def draw_browser(path: Path) -> None:
     """The demo in the browser: the arm pushes the box; sliders, and the image of the camera at its frustum."""
     with Stage(640, 480, scale=1) as stage, browser(*SIZE) as chromium, tempfile.TemporaryDirectory() as folder:
         stage.launch("basic_example_kuka_lwr.launch", "real_time_factor:=0.2")
-        log, picture = Path(folder) / "view.log", Path(folder) / "page.png"
-        with log.open("w") as output:
-            stage.start(["rosrun", "rpbi_data", "browser_view_node.py", "_port:=0"], stdout=output)
-        link = wait_until(lambda: re.search(r"view: (\S+)", log.read_text()), "the view runs")[1]
+        link = _start_view(stage, Path(folder))
         tab = chromium.tab()
         tab.open(f"{link}?{CAMERA}")
         tab.wait("document.body.innerText.includes('Time line')", 300.0)
@@ -48,8 +57,71 @@ def draw_browser(path: Path) -> None:
         next_message("rpbi/box/contacts", Contacts, lambda each: push_n(each) > PUSH_N)
         stage.stop_world()
         time.sleep(DRAWN_S)
-        tab.screenshot(picture)
-        write_png(path, Image.open(picture).convert("RGB"))
+        write_png(path, _screenshot(tab, Path(folder)))
+
+
+def draw_browser_demo(path: Path) -> None:
+    """The demo in RViz and in the browser."""
+    _draw_beside(path, "basic_example_kuka_lwr", (0.9, -1.5, 1.3), (0.1, 0.0, 0.4), ("TF", "Coloured depth"))
+
+
+def draw_browser_factory(path: Path) -> None:
+    """The scene `factory` in RViz and in the browser."""
+    _draw_beside(path, "factory", (1.5, 0.5, 1.9), (0.3, 0.02, 0.9))
+
+
+def draw_browser_talos(path: Path) -> None:
+    """The scene `talos` in RViz and in the browser."""
+    _draw_beside(path, "talos", (2.2, 1.8, 1.5), (0.15, 0.0, 0.9))
+
+
+def _draw_beside(
+    path: Path, name: str, eye: tuple[float, ...], focus: tuple[float, ...], hidden: tuple[str, ...] = ()
+) -> None:
+    """Draws one tick of an example in RViz, and in the browser with the same camera.
+
+    Args:
+        path: The picture.
+        name: Name of the launch file and of RViz's configuration.
+        eye: Position of the camera [m].
+        focus: Point that it looks at [m].
+        hidden: Displays of RViz that are left out.
+    """
+    away = np.subtract(eye, focus)
+    distance_m = float(np.linalg.norm(away))
+    orbit = {"Pitch": math.asin(away[2] / distance_m), "Yaw": math.atan2(away[1], away[0]) % (2.0 * math.pi)}
+    camera = f"initialCameraPosition={','.join(map(str, eye))}&initialCameraLookAt={','.join(map(str, focus))}"
+    with Stage(*HALF) as stage, browser(PAGE_WIDTH, HALF[1]) as chromium, tempfile.TemporaryDirectory() as folder:
+        stage.launch(f"{name}.launch")
+        next_message("rpbi/state", SimulationState, lambda each: each.simulated_time > STARTS_S)
+        stage.stop_world()
+        without = dict.fromkeys(hidden)
+        stage.rviz(RVIZ / f"{name}.rviz", without, Distance=distance_m, Focal_Point=dict(zip("XYZ", focus)), **orbit)
+        rviz = stage.still_picture()
+        tab = chromium.tab()
+        tab.open(f"{_start_view(stage, Path(folder))}?{camera}")
+        tab.wait("document.body.innerText.includes('Time line')", 300.0)
+        _close_warning(tab)
+        time.sleep(DRAWN_S)
+        left = (PAGE_WIDTH - HALF[0]) // 2
+        page = _screenshot(tab, Path(folder)).crop((left, 0, left + HALF[0], HALF[1]))
+    label(rviz, "RViz", (60, 24))
+    label(page, "browser", (60, 24))
+    write_png(path, beside(rviz, page))
+
+
+def _start_view(stage: Stage, folder: Path) -> str:
+    """Starts the view, and returns its link."""
+    log = folder / "view.log"
+    with log.open("w") as output:
+        stage.start(["rosrun", "rpbi_data", "browser_view_node.py", "_port:=0"], stdout=output)
+    return str(wait_until(lambda: re.search(r"view: (\S+)", log.read_text()), "the view runs")[1])
+
+
+def _screenshot(tab: Tab, folder: Path) -> Image.Image:
+    """Returns a picture of the page."""
+    tab.screenshot(folder / "page.png")
+    return Image.open(folder / "page.png").convert("RGB")
 
 
 def _close_warning(tab: Tab) -> None:

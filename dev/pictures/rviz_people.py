@@ -32,7 +32,7 @@ RESTS_S = 3.0
 """Time after which the arm rests on the box, and after which RViz shows all segments of people [s]."""
 TWIN = np.array((0.0, 1.2, -0.01))
 """Place of the twin's world in that of the laboratory, for RViz [m]."""
-PART_PX = 360
+PART_PX = 420
 """Rows and columns of the part of RViz's view that shows one of two worlds [px]."""
 CAMERA_YAW_RAD = -0.8
 """Direction of the camera as seen from the avatar [rad]."""
@@ -113,7 +113,7 @@ def teleop(path: Path) -> None:
 def human_interaction(path: Path) -> None:
     """Draws the arm that presses on the box, and the window of the virtual device with its force."""
     with Stage(760, 600) as stage, tempfile.TemporaryDirectory() as folder:
-        stage.launch("human_interaction.launch", "plot:=false", "guard:=false", f"output:={folder}")
+        stage.launch("human_interaction.launch", "plot:=false", f"output:={folder}")
         force = Newest("haptics/force", WrenchStamped)
         handle = place("^Virtual haptic device$")
         wait_until(lambda: force.message, "the device runs")

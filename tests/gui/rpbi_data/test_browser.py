@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import CHROMIUM, Browser, browser
+from chromium import CHROMIUM, Browser, browser
 from PIL import Image
 from worlds import FLOOR, box, write_world
 

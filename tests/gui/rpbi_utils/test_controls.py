@@ -261,7 +261,9 @@ def test_buttons_of_a_planner_call_its_services(controls):
     for name in ("plan_to_frame", "move", "stop"):
         answer = TriggerResponse(True, f"answer of {name}")
         services.append(
-            rospy.Service(f"/planner/{name}", Trigger, lambda _, n=name, answer=answer: called.append(n) or answer)
+            rospy.Service(
+                f"/planner/{name}", Trigger, lambda _, name=name, answer=answer: called.append(name) or answer
+            )
         )
     try:
         for title, name in (("Plan", "plan_to_frame"), ("Move", "move"), ("Stop", "stop")):

@@ -82,7 +82,7 @@ def rests(planner) -> bool:
     return all(np.ptp([each[name] for each in recent]) < 1e-3 for name in NAMES)
 
 
-def test_plan_is_a_trajectory_from_rest_to_rest_without_a_motion(planner):
+def test_plan_is_a_trajectory_and_moves_nothing(planner):
     before = planner.joints
     goal = [*before[:1], *READY[1:]]
     goal[0] = before[0] + 0.6

@@ -140,7 +140,7 @@ def test_soft_body_is_shown_as_triangles(tmp_path: Path) -> None:
 
 
 def test_requests_between_steps_are_refused_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rpbi_data.view.script_view.LIMIT_S", 0.2)
+    monkeypatch.setattr("rpbi_data.view.script_controls.LIMIT_S", 0.2)
     world = World.from_file(write_world(tmp_path, robots=(iiwa(),)))
     with world.view() as view:
         with pytest.raises(InterfaceError, match="does not step the world"):

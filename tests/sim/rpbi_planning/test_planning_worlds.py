@@ -30,7 +30,7 @@ def world():
     made.close()
 
 
-def test_foreseen_equals_what_happens(world):
+def test_foreseen_state_is_reached(world):
     scene = PlanningScene.of_world(world)
     group = Group(scene, ["panda"], ARM)
     for number in range(2):
@@ -68,11 +68,13 @@ def test_two_arms_move_together():
 def test_scene_follows_the_world(world):
     scene = PlanningScene.of_world(world)
     assert scene.names == ("panda", "floor") and len(scene.robots["panda"].positions) == 8
+    version = scene.version
     world.put("panda/target", {"panda_joint1": 0.5})
     for _ in range(2000):
         world.step()
     scene.update(world)
     assert scene.robots["panda"].positions[0] == pytest.approx(0.5, abs=0.02)
+    assert scene.version == version  # the collision model is kept
     world.remove("floor")
     scene.update(world)
     assert scene.names == ("panda",)

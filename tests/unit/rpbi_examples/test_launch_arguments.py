@@ -82,4 +82,4 @@ def test_robot_with_sliders_swings_only_on_request(path, given, swings):
 
 
 def test_scenes_and_robots_that_swing_are_found():
-    assert (len(SCENES), len(SWINGING)) == (6, 4)
+    assert (len(SCENES), len(SWINGING)) == (7, 4)

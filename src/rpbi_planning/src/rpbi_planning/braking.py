@@ -66,12 +66,8 @@ def braked(trajectory: SampledMotion, from_s: float, acceleration: float) -> Sam
         _sampled(times, values, path_s)
         for values in (trajectory.positions, trajectory.velocities, trajectory.accelerations)
     )
-    return SampledMotion(
-        at_s,
-        positions,
-        velocities * rate[:, None],
-        accelerations * rate[:, None] ** 2 + velocities * slowing[:, None],
-    )
+    slowed: Array = accelerations * np.square(rate)[:, None] + velocities * slowing[:, None]
+    return SampledMotion(at_s, positions, velocities * rate[:, None], slowed)
 
 
 def _sampled(times: Array, values: Any, at_s: Array) -> Array:

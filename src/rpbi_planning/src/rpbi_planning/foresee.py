@@ -1,4 +1,4 @@
-"""What happens when a plan is executed: the plan in a fork of a world, and in the world itself."""
+"""Effects of a plan, simulated in a fork of a world; execution of a plan in the world itself."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SETTLING_S = 0.2
 
 
 class Foreseen(NamedTuple):
-    """What happens when a motion is executed.
+    """Effects of a motion that is executed in a world.
 
     Attributes:
         contacts: Contacts of the robots that begin during the motion: time [s], the two bodies, and the force [N].

@@ -34,7 +34,7 @@ class PlanningProblem:
         seed: Seed of random numbers.
         is_cancelled: Function that says whether the search has to end.
         constraints: Constraints that the whole path has to keep; the model checks them, too.
-        kept: What planners keep for later problems in the same scene, by planner.
+        kept: Data that planners keep for later problems in the same scene, by planner.
     """
 
     model: CollisionModel

@@ -56,7 +56,7 @@ class PlanResult:
         trajectory: The timed motion; None without success.
         planner: Name of the planner that found the path; `straight` if the straight motion to the goal is free.
         times_s: Time of each step: goals, planning, shortening, timing, checking, foreseeing [s].
-        foreseen: What happens in a fork of the world; None if that was not asked for.
+        foreseen: Effects of the motion in a fork of the world; None if they were not asked for.
         processor_s: Processor time of each step [s], which is less than `times_s` on a busy computer.
     """
 
@@ -208,7 +208,9 @@ class _Plan:
                 "planner or less padding may help"
             )
         if shorten_s > 0.0:
-            path = shortened(path, model, time.monotonic() + shorten_s, self._seed, self._is_cancelled)
+            end = time.monotonic() + shorten_s
+            connect = self._bridges(model, start, bound, end) if bound else None
+            path = shortened(path, model, end, self._seed, self._is_cancelled, connect)
         self._clock.note("shortening")
         scales = (share * speed**power for power, share in enumerate(RESERVE, 1))
         limits = TimingLimits(*(scale * each for scale, each in zip(scales, group.motion_limits)))
@@ -243,6 +245,14 @@ class _Plan:
             foreseen,
             self._clock.processor_s,
         )
+
+    def _bridges(
+        self, model: CollisionModel, start: Array, bound: Sequence[BoundConstraint], until: float
+    ) -> Callable[[Array, Array], Array | None]:
+        from .planners.projected import ProjectedConfig, bridge
+
+        problem = PlanningProblem(model, start, start[None], until, self._seed, self._is_cancelled, bound)
+        return lambda first, last: bridge(first, last, problem, ProjectedConfig().step)
 
     def _failed(self, message: str) -> PlanResult:
         names = self._group.joint_names

@@ -142,7 +142,7 @@ class PlanningScene:
         allowed: Pairs of names that may touch: bodies, or links as `robot/link`.
         padding_m: Least distance from bodies and from other robots [m].
         self_padding_m: Least distance between links of one robot [m].
-        kept_by_planners: What planners keep between plans, and a description of the scene for which it is valid.
+        kept_by_planners: Description of the scene of the last plan, and data that planners keep for this scene.
         kept_model: The collision model of the last plan, and a description of the scene for which it is valid.
         version: Number of changes of robots, bodies and attachments; poses and joint positions do not count.
     """
@@ -326,8 +326,9 @@ class PlanningScene:
             ValueError: If a number is not finite, or a robot holds the body.
         """
         if name in self.robots:
-            if self.robots[name].base != pose:
-                self.robots[name].base = _checked(pose)
+            checked = _checked(pose)
+            if self.robots[name].base != checked:
+                self.robots[name].base = checked
                 self.version += 1
         elif name in self.bodies:
             if name in self.held:

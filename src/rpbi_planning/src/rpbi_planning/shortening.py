@@ -18,7 +18,12 @@ PATIENCE = 60
 
 
 def shortened(
-    path: Array, model: CollisionModel, until: float, seed: int, is_cancelled: Callable[[], bool] = lambda: False
+    path: Array,
+    model: CollisionModel,
+    until: float,
+    seed: int,
+    is_cancelled: Callable[[], bool] = lambda: False,
+    connect: Callable[[Array, Array], Array | None] | None = None,
 ) -> Array:
     """Shortens a path whose straight parts are proven; those of the result are proven, too.
 
@@ -31,6 +36,8 @@ def shortened(
         until: Time of `time.monotonic` at which the search ends [s].
         seed: Seed of random numbers.
         is_cancelled: Function that says whether the search has to end.
+        connect: Function that returns proven waypoints between two configurations, both included, or None. By default,
+            the straight motion is tried.
     """
     generator = np.random.default_rng(seed)
 
@@ -54,11 +61,15 @@ def shortened(
             path[k] + (path[k + 1] - path[k]) * ((s - lengths[k]) / max(lengths[k + 1] - lengths[k], 1e-12))
             for k, s in ((i, a), (j, b))
         )
-        if np.linalg.norm(last - first) > (b - a) * (1.0 - MIN_GAIN):
+        least = (b - a) * (1.0 - MIN_GAIN)
+        if np.linalg.norm(last - first) > least:
             continue
         if model.edge(first, last):
-            path = np.concatenate((path[: i + 1], first[None], last[None], path[j + 1 :]))
-            path, failed = _without_repeats(path), 0
+            between: Array | None = np.array((first, last))
+        else:
+            between = None if connect is None else connect(first, last)
+        if between is not None and length(between) < least:
+            path, failed = _without_repeats(np.concatenate((path[: i + 1], between, path[j + 1 :]))), 0
     return _without_detours(path, model, is_over)
 
 

@@ -221,10 +221,8 @@ def _rounded(path: Array, limits: TimingLimits) -> _Part:
         spans = np.where(short, spans * GROWTH, spans)
 
 
-def _joined(
-    joint_names: Sequence[str], path: Array, parts: Sequence[_Part]
-) -> tuple[PlannedTrajectory, list[list[float]]]:
-    """Makes one motion of all parts, and returns the times of the waypoints by part."""
+def _joined(joint_names: Sequence[str], path: Array, parts: Sequence[_Part]) -> tuple[PlannedTrajectory, list[float]]:
+    """Makes one motion of all parts, and returns the times of the waypoints."""
     knots, states, q, now = list[float](), list[Array](), path[0].astype(float), 0.0
     corners, first = list[float](), 0
     for part in parts:

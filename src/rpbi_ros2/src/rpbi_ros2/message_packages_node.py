@@ -80,11 +80,17 @@ def write_package(package: str, folder: Path) -> list[str]:
 
 
 def message_text(message_type: Ros2Type, definition: str) -> str:
-    """Returns the definition of a message for ROS 2: its constants that are numbers, and its fields."""
+    """Returns the definition of a message for ROS 2: its constants that are numbers, in capitals, and its fields."""
     own = definition.partition("=" * 80)[0]
     lines = (line.partition("#")[0].strip() for line in own.splitlines())
-    constants = [line for line in lines if "=" in line and not line.startswith("string")]
+    constants = [_constant(line) for line in lines if "=" in line and not line.startswith("string")]
     return "\n".join([*constants, *map(_line, message_type.members)]) + "\n"
+
+
+def _constant(line: str) -> str:
+    name, _, value = line.partition("=")
+    type_name, name = name.split()
+    return f"{type_name} {name.upper()}={value.strip()}"
 
 
 def _line(field: Ros2Field) -> str:

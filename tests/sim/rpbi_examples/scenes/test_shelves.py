@@ -43,7 +43,7 @@ def visit(scene: Shelves, cycles: int) -> list[float]:
     return found
 
 
-def test_home_is_free_and_the_lane_is_blocked_near_the_arm():
+def test_carriage_blocks_the_lane_of_an_arm():
     lower, upper = blocking("left").along(np.array([HOME, HOME, HOME]))
     assert not lower.any() and not upper.any()
     tables = blocking("left").along(np.array([IN_FRONT, IN_FRONT, IN_FRONT]))
@@ -53,7 +53,7 @@ def test_home_is_free_and_the_lane_is_blocked_near_the_arm():
     assert abs(np.mean(cells) - BASES["left"].position[1]) < 0.1
 
 
-def test_arm_goes_to_the_end_and_back_if_carriages_are_far():
+def test_arm_advances_if_carriages_are_far():
     found = visit(scene_with(lower_carriage=-1.1, upper_carriage=-1.1), 1000)
     assert max(found) == pytest.approx(IN_FRONT[1]) and found[-1] == pytest.approx(HOME[1])
 
@@ -79,7 +79,7 @@ def test_arm_retreats_from_a_carriage_that_comes():
 
 
 @pytest.mark.thorough
-def test_both_arms_reach_their_goals_and_touch_nothing(env):
+def test_both_arms_reach_their_goals(env):
     result = run_episode(env, 4001)
     assert result.success and result.done == 4, result
 

@@ -27,14 +27,14 @@ CONTACT_PRESETS: dict[str, ContactPreset] = {
     "impact": ContactPreset(
         {
             "changeDynamics": {
-                "lateralFriction": 0.165,
-                "restitution": 0.11,
-                "contactStiffness": 23000.0,
-                "contactDamping": 70.0,
+                "lateralFriction": 0.168,
+                "restitution": 0.06,
+                "contactStiffness": 21200.0,
+                "contactDamping": 58.0,
                 "linearDamping": 0.0,
                 "angularDamping": 0.0,
             },
-            "contactFriction": {"edge": 0.176, "face": 0.211},
+            "contactFriction": {"edge": 0.169, "face": 0.199},
         },
         {"timeStep": 0.00168918919},
     ),

@@ -30,7 +30,7 @@ TRIES = 3
 
 
 def planning_example() -> None:
-    """Runs the node that carries all boxes into the other bookcase, and then back, `~rounds` times; 0: for ever."""
+    """Runs the node that carries all boxes into the other bookcase, and then back, `~rounds` times; 0: forever."""
     run_node("planning_example", _carry_boxes)
 
 

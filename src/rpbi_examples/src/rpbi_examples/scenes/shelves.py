@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pybullet_data
@@ -39,7 +40,7 @@ RAILS = tuple(
     Rail(name, "rail_joint", (0.6, 0.0, height), 1.1, (0.1, 0.14, 0.14), 0.1)
     for name, height in (("lower_carriage", 0.8), ("upper_carriage", 1.18))
 )
-OPTIONS = {"planner": "projected", "time_limit_s": 60.0, "shorten_s": 60.0, "certify": False}
+OPTIONS: dict[str, Any] = {"planner": "projected", "time_limit_s": 60.0, "shorten_s": 60.0, "certify": False}
 """Options of the planner. Its random numbers depend only on the seed, and its time limits are never reached, so that an
 episode does not depend on the speed of the computer.
 """

@@ -23,6 +23,26 @@ class ProjectedConfig(PlannerConfig):
     step: Positive = Field(0.25, description="Length of a step in joint space [rad or m].")
 
 
+def bridge(start: Array, end: Array, problem: PlanningProblem, step: float) -> Array | None:
+    """Returns waypoints between two configurations, in projected and proven steps; None if a step fails.
+
+    Args:
+        start: The first configuration.
+        end: The last configuration.
+        problem: Constraints, and the proof of motions.
+        step: Length of a step [rad or m].
+    """
+    path, model = [start], problem.model
+    while (far := float(np.linalg.norm(end - path[-1]))) > step and not problem.is_over:
+        q = project(path[-1] + step / far * (end - path[-1]), problem.group, problem.constraints)
+        if q is None or float(np.linalg.norm(end - q)) > far - 0.1 * step:
+            return None
+        if not (model.is_free(q) and model.edge(path[-1], q)):
+            return None
+        path.append(q)
+    return np.array([*path, end]) if model.edge(path[-1], end) else None
+
+
 class _Tree:
     def __init__(self, roots: Array) -> None:
         self.nodes, self.parents = [*roots], [-1] * len(roots)

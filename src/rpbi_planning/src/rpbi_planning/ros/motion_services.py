@@ -189,7 +189,7 @@ class MotionServices:
         scene = self._scene_for(request, robot)
         options: dict[str, Any] = {
             "start": positions_in(request.start, "start") or None,
-            "group": tuple(request.group) or config.group or robot.follower.joint_names,
+            "group": tuple(request.group) or config.group or _controlled(robot),
             "constraints": constraints_in(request),
             "planner": request.planner or config.planner,
             "time_limit_s": request.time_limit or config.time_limit_s,
@@ -334,5 +334,18 @@ class MotionServices:
         if robot.name not in self._clients:
             action = self._config.action or f"rpbi/{robot.name}/joint_trajectory_controller/follow_joint_trajectory"
             acceleration = self._config.acceleration
-            self._clients[robot.name] = TrajectoryClient(action, robot.follower.joint_names, acceleration)
+            self._clients[robot.name] = TrajectoryClient(action, _controlled(robot), acceleration)
         return self._clients[robot.name]
+
+
+def _controlled(robot: Robot) -> tuple[str, ...]:
+    """Returns the joints of a robot's trajectory controller.
+
+    Raises:
+        InterfaceError: If the robot does not have this controller.
+    """
+    if robot.follower is None:
+        raise InterfaceError(
+            f"robot '{robot.name}': expected the key joint_trajectory_controller in its file, got none"
+        )
+    return robot.follower.joint_names

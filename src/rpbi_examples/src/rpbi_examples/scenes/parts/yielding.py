@@ -176,7 +176,7 @@ class YieldingArm:
 
 
 def moving(scene: Scene, rail: Rail, random: np.random.Generator, period_s: float) -> Iterator[None]:
-    """Moves a carriage between random places at random speeds, with pauses, for ever."""
+    """Moves a carriage between random places at random speeds, with pauses, forever."""
     at_m = scene.seen.joints[rail.robot][rail.joint]
     while True:
         goal_m = float(random.uniform(-rail.half_m, rail.half_m))
