@@ -127,6 +127,20 @@ def test_links_have_headings_as_texts(site):
     assert texts == []
 
 
+def test_pictures_have_visible_captions(site):
+    pages = {path.stem: path.read_text() for path in site.glob("*.html")}
+    assert len(re.findall("<figcaption>", "".join(pages.values()))) > 60
+    assert re.search('<figure><img alt="([^"]+)"[^>]*><figcaption>\\1</figcaption></figure>', pages["dynamics"])
+    assert re.search('<figure><a [^>]*><img alt="([^"]+)"[^>]*></a><figcaption>\\1<', pages["index"])
+    assert [name for name, html in pages.items() if "<p><img" in html] == []
+
+
+def test_short_code_in_tables_is_marked_and_long_code_is_not(site):
+    cells = re.findall(r"<td>.*?</td>", "".join((site / name).read_text() for name in ("gym.html", "planning.html")))
+    assert '<td><code class="short">rpbi/Wiping-v0</code></td>' in cells
+    assert [cell for cell in cells if cell.startswith("<td><code>the start is in collision")]
+
+
 def test_planted_faults_are_named(tmp_path):
     shutil.copytree(CONFIG.parent, tmp_path / "dev/site", ignore=shutil.ignore_patterns("api", "__pycache__"))
     config = tmp_path / "dev/site" / CONFIG.name

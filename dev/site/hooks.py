@@ -21,6 +21,11 @@ FILE_AS_TEXT = re.compile(r"\[`?(\w+\.md)`?\]\(")
 """A link whose text is the file name of a page."""
 MARK = re.compile(r"^ *<!-- .* -->\n(?= *```)", re.MULTILINE)
 """A comment before a block, for the tests; MkDocs would end a list with it."""
+PICTURE = re.compile(r'<p>((?:<a [^>]*>)?<img alt="([^"]+)"[^>]*>(?:</a>)?)</p>')
+"""A picture that is alone in its paragraph."""
+CELL = re.compile(r"<td[^>]*>.*?</td>")
+SHORT_CODE = re.compile(r"<code>([^<]{1,30})</code>")
+"""A name in a cell of a table, which the style keeps on one line."""
 
 LOG = logging.getLogger("mkdocs.hooks.site")
 MIRROR = tempfile.TemporaryDirectory(prefix="site-api-")
@@ -60,6 +65,12 @@ def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> st
     page.meta["tags"] = search["words"].get(page.file.src_uri, [])
     named = FILE_AS_TEXT.sub(lambda match: f"[{heading(config, match[1])}](", MARK.sub("", markdown))
     return LINK_OUT.sub(r"](files/\1)", named)
+
+
+def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
+    """Shows the alternative text of a picture as its caption, and marks short code in tables."""
+    html = PICTURE.sub(r"<figure>\1<figcaption>\2</figcaption></figure>", html)
+    return CELL.sub(lambda cell: SHORT_CODE.sub(r'<code class="short">\1</code>', cell[0]), html)
 
 
 def heading(config: Any, name: str) -> str:

@@ -184,7 +184,7 @@ class StartWithin(ConfigModel):
         description="Topic of the commanded robot's joint states, with the names and units of the commands."
     )
     tolerance: Annotated[Positive, Unit("rad or m")] = Field(
-        0.05, description="Largest distance of a joint from its first command."
+        0.05, description="Largest initial difference between a joint and its command at which the node starts."
     )
 
 

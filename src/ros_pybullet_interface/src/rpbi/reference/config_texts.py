@@ -53,8 +53,11 @@ BEGINNINGS = {
     ),
     NODES: (
         "YAML reference: nodes",
-        "Some nodes read a YAML file as their parameter `~config`. Here are its keys. For the nodes see "
-        "[custom_ros_tools.md](custom_ros_tools.md).",
+        "This page lists the keys of three nodes of [custom_ros_tools.md](custom_ros_tools.md) that read a YAML file as "
+        "their parameter `~config`. The pages of other nodes explain their keys: "
+        "[motion_planner](planning.md#configuration), [tracked_object](tracking.md#from-a-tracking-system-to-tf), "
+        "[apriltag](tracking.md#apriltags-in-images), [primitives](learning.md), [guard](safety.md), "
+        "[stand_in](real_robots.md#the-stand-in) and [ik_setup](ik.md).",
     ),
 }
 """Title and first paragraph of each page, keyed by page, in the order of the overview."""
