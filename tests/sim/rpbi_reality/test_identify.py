@@ -108,9 +108,8 @@ def test_results_can_be_used_as_world_and_as_random_variation(world, motion, tmp
     config = fit()
     result = identify_world(world, motion, config, 1)
     write_results(Path(world).parent / "found", world, config, result)
-    patched = Path(world).with_name("patched.yaml")
-    patched.write_text((Path(world).parent / "found/world.yaml").read_text())
-    (box,) = (each.config for each in load_world(str(patched)).objects if each.config.name == "box")
+    patched = load_world(str(Path(world).parent / "found/world.yaml"))
+    (box,) = (each.config for each in patched.objects if each.config.name == "box")
     assert box.changeDynamics.lateralFriction == result.values["friction"]
     assert box.changeDynamics.linearDamping == 0.0  # keys of the file stay
     variation = Randomization.read(str(Path(world).parent / "found/randomization.yaml"))

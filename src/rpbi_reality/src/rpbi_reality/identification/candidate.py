@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import copy
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
 
+from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from robot_model.asset_files import find_file, find_folder
 from robot_model.geometry import Pose
@@ -71,10 +74,11 @@ class WorldTemplate:
     """
 
     def __init__(self, path: str, config: FitConfig, robot_description: str | None = None) -> None:
-        self.path, self.config, self._urdf = path, config, robot_description
+        self.path, self.config, self._urdf = replace_package(path), config, robot_description
         loaded = load_world(path, robot_description)
         self._main = dict(load_main_file(path))
         self._entries: dict[str, tuple[str, int]] = {}
+        self._paths: dict[tuple[str, int], str] = {}
         self._files: dict[str, Mapping[str, Any]] = {}
         self._find_objects()
         problems = []
@@ -117,6 +121,20 @@ class WorldTemplate:
                 main[section][index] = _put(overrides, steps, value)
         return main
 
+    def standalone_patch(self, values: Mapping[str, float], folder: Path) -> dict[str, Any]:
+        """Returns the main file with the values of parameters, for a file in another folder.
+
+        Args:
+            values: Values of parameters.
+            folder: Folder to which the names of the objects' files are relative.
+        """
+        main = self.patch(values)
+        for (section, index), path in self._paths.items():
+            entry = main[section][index]
+            file = os.path.relpath(path, folder)
+            main[section][index] = file if isinstance(entry, str) else {**entry, "file": file}
+        return main
+
     def load(self, values: Mapping[str, float]) -> LoadedWorld:
         """Loads the world with the values of parameters.
 
@@ -148,7 +166,9 @@ class WorldTemplate:
         for section in object_sections():
             for index, entry in enumerate(self._main.get(section) or ()):
                 parsed = parse_object_entry(entry)
-                data = parsed.apply_overrides(load_object_file(find_file(parsed.file, self.path, tuple(folders))))
+                path = find_file(parsed.file, self.path, tuple(folders))
+                data = parsed.apply_overrides(load_object_file(path))
+                self._paths[section, index] = path
                 self._entries[str(data.get("name"))] = (section, index)
                 self._files[str(data.get("name"))] = data
 

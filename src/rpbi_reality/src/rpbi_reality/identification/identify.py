@@ -41,7 +41,7 @@ class Identified(NamedTuple):
         held_out: Names of all other runs.
         candidates: Number of simulated candidates.
         problems: Why candidates could not be simulated, with the number of such candidates.
-        patch: Main file of the world with the identified values.
+        template: The world, for the main file with the identified values.
     """
 
     values: Mapping[str, float]
@@ -52,7 +52,7 @@ class Identified(NamedTuple):
     held_out: list[str]
     candidates: int
     problems: Mapping[str, int]
-    patch: Mapping[str, Any]
+    template: WorldTemplate
 
 
 def read_fit(path: Path) -> FitConfig:
@@ -127,7 +127,7 @@ def identify_world(
         [runs[index].name for index in held_out],
         evaluator.count,
         evaluator.problems,
-        WorldTemplate(world, config, urdf).patch(values),
+        WorldTemplate(world, config, urdf),
     )
 
 
@@ -204,7 +204,8 @@ def write_results(folder: Path, world: str, config: FitConfig, result: Identifie
     note = "".join(f"# {text}: {value:g}\n" for name, value in others.items() for text in config.parameters[name].set)
     head = f"# {Path(world).name} with identified values; see report.json for their intervals.\n{note}"
     texts = {
-        "world.yaml": head + yaml.safe_dump(_plain(result.patch), sort_keys=False, width=120),
+        "world.yaml": head
+        + yaml.safe_dump(_plain(result.template.standalone_patch(result.values, folder)), sort_keys=False, width=120),
         "randomization.yaml": yaml.safe_dump(randomization(config, result.uncertainty), sort_keys=False),
         "report.json": json.dumps(report, indent=1) + "\n",
     }
