@@ -145,7 +145,8 @@ def _clutter(random: np.random.Generator, count: int, least: float) -> Boxes:
 class Oracle:
     """Counts contacts of robots in PyBullet, without any code of the planner.
 
-    Pairs of links that touch at the start of a curve or are neighbours are not counted, as PyBullet does by itself.
+    Pairs of links of one robot that touch at a start or goal are not counted: their shapes overlap by construction.
+    PyBullet leaves out neighbouring links by itself.
     """
 
     def __init__(self, made: BenchScene) -> None:
@@ -166,7 +167,9 @@ class Oracle:
             half = [each / 2.0 for each in box.size]
             shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **on)
             pybullet.createMultiBody(0.0, shape, -1, *made.scene.poses[name], **on)
-        self._ignored = {pair for q in (made.queries[0].start, made.queries[-1].goal) for pair in self._touching(q)}
+        self._ignored = set[tuple[int, int, int, int]]()
+        touching = {pair for query in made.queries for q in query for pair in self._touching(q)}
+        self._ignored = {pair for pair in touching if pair[0] == pair[1]}
 
     def _touching(self, q: np.ndarray) -> set[tuple[int, int, int, int]]:
         for body, joint, column in self._columns:

@@ -116,3 +116,26 @@ def test_friction_on_faces_differs_from_friction_on_corners(keys):
         assert lost == pytest.approx((0.5 if keys else 0.1) * 0.981, rel=0.1)
     finally:
         world.close()
+
+
+@pytest.mark.parametrize("keyframe", [False, True])
+def test_friction_by_contacts_is_restored_exactly(keyframe):
+    world = _world({"timeStep": 0.002, "setGravity": {"gravZ": -9.81}})
+    try:
+        box = {"shapeType": "GEOM_BOX", "halfExtents": [0.05, 0.05, 0.05]}
+        shapes = {"createVisualShape": box, "createCollisionShape": box, "basePosition": [0.0, 0.0, 0.15]}
+        turned = {"baseOrientation": [0.3, 0.1, 0.2, np.sqrt(0.86)], "contactFriction": {"edge": 0.3, "face": 0.6}}
+        moving = {"resetBaseVelocity": {"linearVelocity": [1.0, 0.3, 0.0]}, "changeDynamics": {"lateralFriction": 0.1}}
+        world.add("dynamic", ball(**shapes, **turned, **moving))
+        for _ in range(120):
+            world.step()
+        state = world.save(keyframe=keyframe)
+        for _ in range(80):
+            world.step()
+        after = world.state_hash()
+        world.restore(state)
+        for _ in range(80):
+            world.step()
+        assert world.state_hash() == after
+    finally:
+        world.close()

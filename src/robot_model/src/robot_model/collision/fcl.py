@@ -58,7 +58,7 @@ class FclShapes:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
-        self._hulls: dict[str | int, list[Hull]] = {**hulls_of_links(robot)}
+        self._hulls = dict[str | int, list[Hull]](hulls_of_links(robot).items())
         self.links = tuple(robot_link for robot_link in robot.links if robot_link in self._hulls)
         self.place(np.zeros(len(robot.joint_names)))
 
