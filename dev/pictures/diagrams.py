@@ -45,7 +45,7 @@ def architecture(path: Path) -> None:
     """Draws the packages and the data that flow between them."""
     drawing = Diagram(800, 706, "Packages, and the data that flow between them")
     people = drawing.box(Box(20, 20, 240, 62), PEOPLE, "operator_node", ["people: devices, suits, haptics"])
-    planned = drawing.box(Box(280, 20, 240, 62), PEOPLE, "motion_primitives, rpbi_mpc", ["learned and planned motions"])
+    planned = drawing.box(Box(280, 20, 240, 62), PEOPLE, "rpbi_planning, rpbi_mpc", ["and motion_primitives"])
     own = drawing.box(Box(540, 20, 226, 62), PLAIN, "your node or policy", ["ROS topics, or Python alone"])
     solver = drawing.box(
         Box(20, 132, 420, 58), PLAIN, "ik_ros", ["inverse kinematics: pose of a hand to joint targets"]
@@ -63,7 +63,9 @@ def architecture(path: Path) -> None:
     drawing.box(Box(252, 386, 150, 86), "white", "camera process", ["colour, depth,", "point clouds"])
     drawing.box(Box(418, 386, 146, 86), "white", "forks", ["copies that show", "what will happen"])
     robot = drawing.box(Box(626, 348, 140, 58), PLAIN, "real robot", ["its driver"])
-    data = drawing.box(Box(20, 538, 370, 58), DATA, "rpbi_data", ["recordings, replays, episodes, data sets"])
+    data = drawing.box(
+        Box(20, 538, 370, 58), DATA, "rpbi_data, rpbi_reality", ["recordings, data sets; measured contacts"]
+    )
     tools = drawing.box(Box(410, 538, 356, 58), PLAIN, "rpbi_utils, RViz", ["controls window, live plots, tracking"])
     drawing.arrow(people.bottom(), (people.bottom()[0], solver.y))
     drawing.arrow(planned.bottom(0.25), (planned.bottom(0.25)[0], solver.y))
