@@ -28,7 +28,6 @@ PICTURES: dict[str, str] = {
     "scene_talos.gif": "scenes:draw_talos",
     "scene_factory.gif": "scenes:draw_factory",
     "scene_dual_arm.gif": "scenes:draw_dual_arm",
-    "scene_shelves.gif": "scenes:draw_shelves",
     "scene_clutter.gif": "scenes:draw_clutter",
     "clean_floor.png": "clean_forces:draw_floor",
     "clean_impedance.png": "clean_forces:draw_impedance",

@@ -157,11 +157,6 @@ def draw_dual_arm(path: Path) -> None:
     movie("dual_arm", path)
 
 
-def draw_shelves(path: Path) -> None:
-    """Writes the moving picture of the scene `shelves`."""
-    movie("shelves", path)
-
-
 def draw_clutter(path: Path) -> None:
     """Writes the moving picture of the world `clutter`."""
     movie("clutter", path)

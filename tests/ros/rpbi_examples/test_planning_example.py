@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 import rospy
 import tf2_ros
-from node_world import Rosout
-from real_robot import RealRobot
 from ros_system import RosSystem, wait_until
 
 from rpbi_examples.shelving import LEFT, RIGHT
@@ -31,11 +29,3 @@ def test_all_boxes_come_into_the_other_bookcase(ros: RosSystem) -> None:
     output = ros.output(process)
     assert {bookcase_of(buffer, box) for box in BOXES} == {RIGHT.name}, output
     assert all(f"{box} is in 'right_shelf'" in output for box in BOXES), output
-
-
-def test_a_real_robot_follows_the_planned_motions(ros: RosSystem) -> None:
-    real, rosout = RealRobot(ros), Rosout(ros)
-    ros.start(["roslaunch", "rpbi_examples", "planning_example.launch", "headless:=true", "real_robot:=true"])
-    real.wait_until_moved()
-    rosout.wait_for(["box_1 is in 'right_shelf'"], SLOW_S)
-    assert real.has_moved and not rosout.logs("halted")
