@@ -13,8 +13,12 @@ from rpbi.world import World
 from rpbi.world.world_warnings import world_warnings
 
 ROOT = Path(__file__).resolve().parents[4]
-SHIPPED = [path for path in sorted(ROOT.glob("src/*/configs/**/*.yaml")) if "\ntimeStep:" in path.read_text()]
-"""The main files of all examples."""
+SHIPPED = [
+    path
+    for path in sorted(ROOT.glob("src/*/configs/**/*.yaml"))
+    if "\ntimeStep:" in path.read_text() and path.parent.name != "pushes"
+]
+"""All main files, except those whose robot comes with the data of an experiment."""
 
 GRAVITY = {"setGravity": {"gravZ": -9.81}}
 PIN = """<robot name="pin"><link name="base"/>

@@ -120,8 +120,8 @@ class DynamicObject(ShapeObject):
 
     @property
     def needs_steps(self) -> bool:
-        """Whether the friction depends on the contacts."""
-        return self.config.contactFriction is not None
+        """Whether the friction depends on the contacts, or a derived class acts in each tick."""
+        return self.config.contactFriction is not None or type(self).before_step is not DynamicObject.before_step
 
     def before_step(self, tick: int) -> None:
         """Sets the friction for the number of contact points after the last tick."""
