@@ -53,8 +53,8 @@ BEGINNINGS = {
     ),
     NODES: (
         "YAML reference: nodes",
-        "This page lists the keys of three nodes of [custom_ros_tools.md](custom_ros_tools.md) that read a YAML file as "
-        "their parameter `~config`. The pages of other nodes explain their keys: "
+        "This page lists the keys of three nodes of [custom_ros_tools.md](custom_ros_tools.md) that read a YAML file "
+        "as their parameter `~config`. The pages of other nodes explain their keys: "
         "[motion_planner](planning.md#configuration), [tracked_object](tracking.md#from-a-tracking-system-to-tf), "
         "[apriltag](tracking.md#apriltags-in-images), [primitives](learning.md), [guard](safety.md), "
         "[stand_in](real_robots.md#the-stand-in) and [ik_setup](ik.md).",
