@@ -147,7 +147,7 @@ def test_pictures_have_visible_captions(site):
     assert [name for name, html in pages.items() if "<p><img" in html] == []
 
 
-def test_short_code_in_tables_is_marked_and_long_code_is_not(site):
+def test_only_short_code_in_tables_is_marked(site):
     cells = re.findall(r"<td>.*?</td>", "".join((site / name).read_text() for name in ("gym.html", "planning.html")))
     assert '<td><code class="short">rpbi/Wiping-v0</code></td>' in cells
     assert [cell for cell in cells if cell.startswith("<td><code>the start is in collision")]

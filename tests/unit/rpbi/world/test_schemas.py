@@ -96,7 +96,9 @@ def test_shipped_file_with_a_wrong_key_violates_its_schema(path: Path) -> None:
     assert named
     data = yaml.safe_load(path.read_text())
     sensors = [sensor for each in mappings(data) for sensor in each.get("sensors", ())]
-    controllers = [one for each in mappings(data) for one in each.get("controllers", {}).values() if ":" in one["type"]]
+    controllers = [
+        one for each in mappings(data) for one in each.get("controllers", {}).values() if ":" in one.get("type", ":")
+    ]
     of_others = {id(one) for entry in (*sensors, *controllers) for one in mappings(entry)}
     count = 0
     for mapping in mappings(data):
@@ -132,7 +134,8 @@ def test_shipped_files_name_the_schema_of_their_list() -> None:
         for section in sections():
             for entry in main.get(section, ()):
                 file = entry["file"] if isinstance(entry, dict) else entry
-                text = (SRC / re.sub(r"\{(\w+)\}", r"\1", file)).read_text()
+                folder = SRC if file.startswith("{") else path.parent
+                text = (folder / re.sub(r"\{(\w+)\}", r"\1", file)).read_text()
                 assert f"/{kind_of(section)}.schema.json" in text.splitlines()[0], f"{file} is one of {section}"
 
 

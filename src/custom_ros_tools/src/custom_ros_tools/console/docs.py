@@ -51,6 +51,7 @@ WRITERS = (
     "motion_primitives.node_configs:schema_files",
     "rpbi_mpc.node_configs:schema_files",
     "rpbi_planning.node_configs:schema_files",
+    "rpbi_reality.identification.fit_config:schema_files",
     "rpbi_utils.schemas:schema_files",
     "safe_robot.schemas:schema_files",
     "rpbi.gym.schemas:schema_files",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -22,6 +23,7 @@ from custom_ros_tools.schema import (
     Text,
     Unit,
 )
+from custom_ros_tools.schema.json_schema import json_schema, schema_texts
 
 PATH = re.compile(r"(world|measured|inputs|dynamics|[A-Za-z0-9_]+)(\.[A-Za-z0-9_/\[\]]+)+")
 
@@ -136,3 +138,12 @@ class FitConfig(ConfigModel):
         if self.objective == "mean_error" and self.method != "cmaes":
             raise KeyedError("objective", "mean_error is not smooth: write `method: cmaes`")
         return self
+
+
+def schema_files(root: Path) -> dict[Path, str]:
+    """Returns the text of the JSON schema file, indexed by the file's path.
+
+    Args:
+        root: Root folder of the workspace.
+    """
+    return schema_texts(root / "src/rpbi_reality/schema", {"fit": json_schema(FitConfig, "fit")})
