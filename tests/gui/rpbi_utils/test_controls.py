@@ -120,6 +120,7 @@ def controls(module_ros, screen, tmp_path_factory):
     return Controls(module_ros, screen, tmp_path_factory.mktemp("controls"))
 
 
+@pytest.mark.thorough
 def test_world_key_opens_the_window_and_missing_displays_end_it(ros, tmp_path):
     world = write_world(tmp_path, visual=(), controls={"robot_name": "iiwa"})
     launch = ros.start([sys.executable, str(CONSOLE), "launch", str(world), "rviz:=false"], DISPLAY=":12345")

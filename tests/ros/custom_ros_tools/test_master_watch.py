@@ -23,6 +23,7 @@ OLD = {("publishes", "/old"), ("subscribes", "/heard"), ("serves", "/old_too")} 
 NEW = {("publishes", "/new"), ("serves", "/new_too")} | OWN
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", ["is killed", "hangs"])
 def test_changes_while_the_master_is_away_are_registered_later(ros, tmp_path, second_master, way):
     sign = tmp_path / "now"

@@ -27,6 +27,7 @@ def frames(tf, parent, child, since_s=0.0):
     ]
 
 
+@pytest.mark.thorough
 @pytest.mark.quick
 def test_twin_follows_a_box_seen_by_vicon_else_drops_it(ros):
     ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true"])

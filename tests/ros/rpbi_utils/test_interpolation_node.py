@@ -60,6 +60,7 @@ class Motion:
         return self()
 
 
+@pytest.mark.thorough
 def test_joints_pause_repetitions_and_bad_waypoints(ros):
     """In wall time: one life with four motions."""
     start(ros, JOINTS)

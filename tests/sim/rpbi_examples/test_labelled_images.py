@@ -118,6 +118,7 @@ def test_depth_points_lie_on_the_models_at_their_poses(found, models):
     assert worst < TOLERANCE_MM
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "wrong", ["moved", *(pytest.param(wrong, marks=pytest.mark.thorough) for wrong in ("turned", "inverse"))]
 )

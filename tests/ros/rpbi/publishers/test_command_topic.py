@@ -85,6 +85,7 @@ def test_who_was_slow_gets_the_rest_though_nothing_new_comes(world, publisher):
         subscriber.unregister()
 
 
+@pytest.mark.thorough
 def test_recording_cut_anywhere_contains_the_commands_of_its_last_hash(ros, tmp_path):
     simulator = ros.simulator(main_config(tmp_path, robots=(iiwa(),), state_hash_hz=500.0), use_sim_time=True)
     states, commands = ros.listen("/rpbi/state", SimulationState), ros.listen("/rpbi/commands", WorldCommands)

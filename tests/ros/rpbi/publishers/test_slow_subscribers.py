@@ -42,6 +42,7 @@ def frozen(ros, tmp_path):
     os.kill(holder.pid, signal.SIGCONT)
 
 
+@pytest.mark.thorough
 def test_ticks_continue_while_a_subscriber_is_frozen(ros, frozen):
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)

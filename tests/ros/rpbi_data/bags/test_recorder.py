@@ -393,6 +393,7 @@ def test_no_message_of_a_fast_clock_is_missed_at_start(ros: Any, tmp_path: Path)
     assert sent > 0 and len(bag_to_dataframes(recorder.path)["/clock"]) == sent
 
 
+@pytest.mark.thorough
 def test_hanging_publisher_is_named_and_the_others_are_recorded(
     ros: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture, stopped: Callable[[str], str]
 ) -> None:

@@ -161,6 +161,7 @@ def _changed(bag, path, change):
     return path
 
 
+@pytest.mark.thorough
 def test_the_first_differing_tick_is_named(bag, tmp_path):
     def spoil(topic, message):
         if topic == "/rpbi/state" and message.state_hash and message.resets == 1 and message.tick >= 300:

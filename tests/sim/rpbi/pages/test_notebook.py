@@ -44,6 +44,7 @@ def test_it_is_kept_without_results(name):
     assert all(not cell.outputs and cell.execution_count is None for cell in cells if cell.cell_type == "code")
 
 
+@pytest.mark.thorough
 def test_it_runs_with_the_python_of_the_workspace(cells):
     assert shown(cells["probe"]) == repr(sys.prefix)
     assert shown(cells["list-bodies"]) == "['work_area', 'floor', 'box', 'kuka_lwr']"
