@@ -102,7 +102,7 @@ def test_messages_that_do_not_fit_their_type_are_left_out(bridge, unharmed):
 
 
 @pytest.mark.parametrize(
-    ("topic_name", "type_name", "encoding", "told"),
+    ("topic_name", "type_name", "encoding", "message"),
     [
         ("/a", "std_msgs/Int32", "json", "expected encoding ros1, got json"),
         ("/b", "no_such_msgs/Int32", "ros1", "type no_such_msgs/Int32 is not installed"),
@@ -113,13 +113,13 @@ def test_messages_that_do_not_fit_their_type_are_left_out(bridge, unharmed):
     ],
     ids=["encoding", "unknown package", "python module", "path", "markup", "long names"],
 )
-def test_wrong_announcements_are_refused_in_one_line(bridge, topic_name, type_name, encoding, told):
+def test_wrong_announcements_are_refused_in_one_line(bridge, topic_name, type_name, encoding, message):
     before = set(rosgraph.Master("/tests").getTopicTypes()[0])
     with FoxgloveClient(bridge.port) as viewer:
         channel = viewer.advertise(topic_name, type_name, encoding)
         viewer.publish(channel, b"{}")
-        assert bridge.lines(told) == 1
-    (log,) = bridge.rosout.logs(told)
+        assert bridge.lines(message) == 1
+    (log,) = bridge.rosout.logs(message)
     assert len(log.msg) < 300 and "\n" not in log.msg
     assert before == set(rosgraph.Master("/tests").getTopicTypes()[0])
 

@@ -57,7 +57,7 @@ class Refusal(NamedTuple):
 
     Attributes:
         time_s: Time of the command in the motion [s].
-        is_while_braking: Whether not the command, but the braking after it is refused.
+        is_while_braking: True if the braking after the command is refused, False if the command itself is.
         words: Description.
     """
 
