@@ -42,8 +42,10 @@ LONGEST_S, QUICK_LONGEST_S = 60.0, 10.0
 """Time after which a query counts as one without a solution, if no planner finds one [s]."""
 PADDING_M = 0.005
 """Padding of the scenes; the oracle has an error of 1 to 2 mm, since it rounds edges."""
-STEP, QUICK_STEP = 1e-4, 1e-3
-"""Largest motion of a joint between two samples of the oracle [rad]."""
+FINE_STEP, STEP = 1e-4, 1e-3
+"""Largest motion of a joint between two samples of the oracle [rad]: in `FINE_QUERIES` of each scene, and in others."""
+FINE_QUERIES = 5
+"""Number of queries in each scene whose curves the oracle samples finely: a curve takes it some 10 s."""
 COMPARED_S = 10.0
 """Time of AORRTC for a path whose length is compared [s]."""
 CHECKS, QUICK_CHECKS = 5000, 500
@@ -250,13 +252,13 @@ def run(quick: bool) -> list[Result]:
     Args:
         quick: Whether a few scenes, queries and samples will do.
     """
-    count, queries, step = (QUICK_SCENES, QUICK_QUERIES, QUICK_STEP) if quick else (SCENES, QUERIES, STEP)
+    count, queries = (QUICK_SCENES, QUICK_QUERIES) if quick else (SCENES, QUERIES)
     longest_s = QUICK_LONGEST_S if quick else LONGEST_S
     tallies = {kind: Tally() for kind in KINDS}
     ours, theirs = [], []
     for made in scenes(count, queries):
         oracle = Oracle(made)
-        _measure(made, oracle, tallies[made.kind], longest_s, step, quick)
+        _measure(made, oracle, tallies[made.kind], longest_s, quick)
         random = np.random.default_rng(1)
         sampled = random.uniform(made.group.lower, made.group.upper,
                                  (QUICK_CHECKS if quick else CHECKS, len(made.group.lower)))  # fmt: skip
@@ -298,7 +300,7 @@ def _foreseen(count: int) -> Result:
     )
 
 
-def _measure(made: BenchScene, oracle: Oracle, tally: Tally, longest_s: float, step: float, quick: bool) -> None:
+def _measure(made: BenchScene, oracle: Oracle, tally: Tally, longest_s: float, quick: bool) -> None:
     robots = list(made.scene.robots)
     for number, query in enumerate(made.queries):
         for r, robot in enumerate(made.group.robots):
@@ -326,6 +328,7 @@ def _measure(made: BenchScene, oracle: Oracle, tally: Tally, longest_s: float, s
         tally.path_processor_s.append(sum(spent[key] for key in ("scene", "goals", "planning")))
         tally.timed_processor_s.append(tally.path_processor_s[-1] + spent["shortening"] + spent["timing"])
         assert result.trajectory is not None
+        step = STEP if quick or number >= FINE_QUERIES else FINE_STEP
         tally.hits += oracle.hits(dense(result.trajectory, step)) > 0
         straight = query.start + np.linspace(0.0, 1.0, 500)[:, None] * (query.goal - query.start)
         tally.unproven_hits += oracle.hits(straight) > 0
