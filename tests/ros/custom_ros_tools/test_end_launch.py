@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import socketserver
 import sys
+import threading
 
 import pytest
+import rospy
 from ros_system import wait_until
 
 PUBLISHER = 'pkg="custom_ros_tools" type="resettable_static_transform_publisher"'
@@ -33,3 +36,26 @@ def test_only_success_ends_a_launch_without_an_error(ros, tmp_path, end, is_repo
     wait_until(lambda: roslaunch.poll() is not None, "all nodes have ended", 60.0)
     assert ("REQUIRED process [worker-" in ros.output(roslaunch)) == is_reported
     assert roslaunch.returncode == 0 and "Traceback" not in ros.output(roslaunch), ros.output(roslaunch)
+
+
+class NotHttp(socketserver.BaseRequestHandler):
+    """A program that got the port of a `roslaunch` that was killed."""
+
+    def handle(self) -> None:
+        self.request.sendall(b"not HTTP\r\n\r\n")
+
+
+def test_port_of_an_earlier_launch_may_belong_to_another_program(ros, tmp_path):
+    script, launch = tmp_path / "worker.py", tmp_path / "work.launch"
+    script.write_text(SCRIPT.format(end="end_launch('done')"))
+    launch.write_text(LAUNCH.format(python=sys.executable, script=script))
+    with socketserver.TCPServer(("127.0.0.1", 0), NotHttp) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        rospy.set_param("/roslaunch/uris/an_earlier_one", f"http://127.0.0.1:{server.server_address[1]}/")
+        try:
+            roslaunch = ros.start(["roslaunch", str(launch)])
+            wait_until(lambda: roslaunch.poll() is not None, "all nodes have ended", 60.0)
+        finally:
+            rospy.delete_param("/roslaunch/uris/an_earlier_one")
+            server.shutdown()
+    assert "REQUIRED process" not in ros.output(roslaunch), ros.output(roslaunch)

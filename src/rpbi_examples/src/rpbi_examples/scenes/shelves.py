@@ -13,7 +13,7 @@ import pybullet_data
 from custom_ros_tools.config import replace_package
 from robot_model.asset_files import find_file
 from robot_model.collision.shapes import Obstacle
-from robot_model.geometry import Pose, angle_between, minus, norm
+from robot_model.geometry import Pose, angle_between, minus, norm, plus
 from robot_model.model import RobotModel
 from rpbi_planning import PlanningScene, PoseGoal, plan
 
@@ -30,6 +30,10 @@ DEPTHS_M, OFF_M = (0.75, 0.79), 0.04
 """Range of x of the goals, and largest distance of a goal from the middle of its compartment along y and z [m]."""
 INTO = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 """Orientation of the link whose z axis points into the bookcase."""
+SHOULDER_M, HAND_M, REACH_M = 0.36, 0.081, 0.8
+"""Height of the shoulder above the base, distance of the link from the wrist, and largest distance of the wrist of a goal
+from the shoulder, 20 mm less than that of a stretched arm [m]; see joints 2, 4, 6 and 7 in the URDF.
+"""
 GOALS = 2
 """Number of goals of each arm."""
 NEAR_M, NEAR_RAD = 0.01, math.radians(3.0)
@@ -59,10 +63,7 @@ class Shelves(Scene):
 
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)
-        self.goals = {
-            name: [_goal(random, math.copysign(1.0, base.position[1])) for _ in range(GOALS)]
-            for name, base in BASES.items()
-        }
+        self.goals = {name: [_goal(random, base) for _ in range(GOALS)] for name, base in BASES.items()}
         self.goal_numbers = tuple(number for goals in self.goals.values() for goal in goals for number in goal.position)
         self._visited = {name: 0 for name in BASES}
         self._stayed_s = {name: 0.0 for name in BASES}
@@ -152,13 +153,16 @@ def planning_scene() -> PlanningScene:
     return scene
 
 
-def _goal(random: np.random.Generator, side: float) -> Pose:
-    """Returns a random pose of the link in a compartment.
+def _goal(random: np.random.Generator, base: Pose) -> Pose:
+    """Returns a random pose of the link in a compartment on the side of an arm, within the arm's reach.
 
     Args:
         random: Random generator.
-        side: 1 for the left half of the bookcase, -1 for the right half.
+        base: Pose of the arm's root link in the world.
     """
-    x, off_y, off_z = random.uniform((DEPTHS_M[0], -OFF_M, -OFF_M), (DEPTHS_M[1], OFF_M, OFF_M)).tolist()
-    y, z = float(random.choice(COLUMNS_M)), float(random.choice(ROWS_M))
-    return Pose((x, side * (y + off_y), z + off_z), INTO)
+    while True:
+        x, off_y, off_z = random.uniform((DEPTHS_M[0], -OFF_M, -OFF_M), (DEPTHS_M[1], OFF_M, OFF_M)).tolist()
+        y, z = float(random.choice(COLUMNS_M)), float(random.choice(ROWS_M))
+        place = (x, math.copysign(y + off_y, base.position[1]), z + off_z)
+        if norm(minus(place, plus(base.position, (HAND_M, 0.0, SHOULDER_M)))) <= REACH_M:
+            return Pose(place, INTO)

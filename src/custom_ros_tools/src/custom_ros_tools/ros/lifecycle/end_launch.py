@@ -9,10 +9,10 @@ import contextlib
 import os
 import signal
 import threading
-import xmlrpc.client
-from typing import Any
 
 import rospy
+
+from .timed_master import MASTER_FAILURES, timed_master
 
 MAX_FAREWELL_S = 15.0
 """Time for which the node waits for roslaunch to stop it [s]; afterwards, roslaunch kills an interrupted node."""
@@ -39,8 +39,7 @@ def interrupt_roslaunch() -> bool:
     """
     parent = os.getppid()
     for uri in rospy.get_param("/roslaunch/uris", {}).values():
-        with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has ended
-            roslaunch: Any = xmlrpc.client.ServerProxy(uri)
+        with contextlib.suppress(*MASTER_FAILURES), timed_master(uri) as roslaunch:  # its port may be another program's
             if roslaunch.get_pid()[2] == parent:
                 os.kill(parent, signal.SIGINT)
                 return True

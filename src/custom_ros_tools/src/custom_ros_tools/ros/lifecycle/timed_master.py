@@ -38,12 +38,12 @@ class TimedTransport(Transport):
 
 
 def timed_master(uri: str | None = None) -> Any:
-    """Returns the XML-RPC interface of a ROS master, as a context manager that closes the connection.
+    """Returns the XML-RPC interface of a ROS master or a `roslaunch`, as a context manager that closes the connection.
 
     Calls return (code, message, value). They raise one of `MASTER_FAILURES` if the master does not answer in time.
 
     Args:
-        uri: Address of the master; by default ROS_MASTER_URI.
+        uri: Its address; by default ROS_MASTER_URI.
     """
     return ServerProxy(uri or rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))
 
