@@ -36,8 +36,7 @@ def check_round_trip(ros, ros2, publisher, package: str) -> None:
     assert kinds
     senders = {name: publisher(f"/there/{name}", each) for name, each in kinds.items()}
     back = {name: ros.listen(f"/back/{name}", each) for name, each in kinds.items()}
-    ros2.bridge()
-    peer = ros2.peer()
+    bridge, peer = ros2.bridge(), ros2.peer()
     for name in kinds:
         peer.relay(f"/there/{name}", f"/back/{name}", f"{package}/msg/{name}")
     for name, message_class in kinds.items():
@@ -47,7 +46,11 @@ def check_round_trip(ros, ros2, publisher, package: str) -> None:
             senders[name].publish(first)
             return bool(back[name].messages)
 
-        wait_until(is_back, f"{name} is back")
+        try:
+            wait_until(is_back, f"{name} is back")
+        except TimeoutError:
+            print(ros.output(bridge), ros.output(peer.process), peer.topics())
+            raise
         sent = [random_message(message_class, random.Random(seed)) for seed in range(1, 6)]
         for message in sent:
             senders[name].publish(message)

@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 import time
+import traceback
 from array import array
 from collections.abc import Callable
 from importlib import import_module
@@ -180,7 +181,15 @@ def main() -> None:
     rclpy.init()
     peer, executor = Peer(), SingleThreadedExecutor()
     executor.add_node(peer)
-    threading.Thread(target=executor.spin, daemon=True).start()
+
+    def spin() -> None:
+        try:
+            executor.spin()
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)  # the test's next call fails
+
+    threading.Thread(target=spin, daemon=True).start()
     with Listener(sys.argv[1]) as listener, listener.accept() as connection:
         while True:
             try:
