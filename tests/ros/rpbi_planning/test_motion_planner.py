@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterator
 
 import actionlib
@@ -176,6 +177,49 @@ def test_obstacle_in_the_way_makes_it_stop_and_plan_again(planner):
         assert planner.joints == pytest.approx(goal, abs=0.01)
     finally:
         assert remove(planner.ros, "block").success
+
+
+def test_foreseen_poses_are_reached(planner):
+    planner.move_to(READY)
+    goal = [0.5, *READY[1:]]
+    answer = planner.plan(joints=JointState(name=NAMES, position=goal), foresee=True)
+    assert answer.success and answer.message.endswith("; foreseen: no contacts of 'panda'"), answer.message
+    bodies = {each.name: each for each in answer.foreseen.bodies}
+    assert {*bodies} == {"panda", "box_1", "box_2", "box_3"}
+    names = bodies["panda"].joint_names
+    last = dict(zip(names, bodies["panda"].joints[-len(names) :]))
+    assert [last[name] for name in NAMES] == pytest.approx(goal, abs=0.01)
+    assert planner.joints == pytest.approx(READY, abs=0.01), "nothing has moved"
+    moved = planner.move(joints=JointState(name=NAMES, position=goal), foresee=True)
+    (error_mm,) = re.findall(r"farthest from its foreseen place: 'box_\d', (\S+) mm", moved.message)
+    assert moved.success and float(error_mm) < 1.0, moved.message
+
+
+def test_touch_that_nobody_has_planned_is_foreseen(planner):
+    planner.move_to(READY)
+    at = planner.link_pose().position
+    shape = {"shapeType": "GEOM_SPHERE", "radius": 0.03}
+    ball = {"name": "ball", "createVisualShape": shape, "createCollisionShape": shape, "baseMass": 0.2,
+            "basePosition": [at[0], at[1], at[2] + 0.5], "broadcast_hz": 50.0}  # fmt: skip
+    assert planner.ros.call("/rpbi/stop", Trigger).success
+    assert add(planner.ros, PybulletObject.DYNAMIC, ball).success
+    try:
+        goal = JointState(name=NAMES[6:], position=[READY[6] + 1.0])
+
+        def plan():
+            return planner.plan(joints=goal, foresee=True)
+
+        answer = wait_until(lambda: (found := plan()).success and "'ball'" in found.message and found, "it is foreseen")
+        assert re.search(r"foreseen: contacts of 'panda' up to \d+ N; 'ball' moves by \d{3} mm$", answer.message)
+    finally:
+        assert planner.ros.call("/rpbi/start", Trigger).success
+        assert remove(planner.ros, "ball").success
+
+
+def test_nothing_is_foreseen_from_another_start(planner):
+    start = JointState(name=NAMES, position=READY)
+    answer = planner.plan(named="ready", start=start, foresee=True)
+    assert not answer.success and answer.message.startswith("foresee: expected no start")
 
 
 BAD = {

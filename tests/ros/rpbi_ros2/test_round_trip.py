@@ -34,11 +34,11 @@ def check_round_trip(ros, ros2, publisher, package: str) -> None:
     """Sends random messages of all types of a package through rclpy, and compares those that come back."""
     kinds = {message_class.__name__: message_class for message_class, _ in converted_classes(package)}
     assert kinds
-    senders = {name: publisher(f"/there/{name}", each) for name, each in kinds.items()}
-    back = {name: ros.listen(f"/back/{name}", each) for name, each in kinds.items()}
+    senders = {name: publisher(f"/there/{package}/{name}", each) for name, each in kinds.items()}
+    back = {name: ros.listen(f"/back/{package}/{name}", each) for name, each in kinds.items()}
     bridge, peer = ros2.bridge(), ros2.peer()
     for name in kinds:
-        peer.relay(f"/there/{name}", f"/back/{name}", f"{package}/msg/{name}")
+        peer.relay(f"/there/{package}/{name}", f"/back/{package}/{name}", f"{package}/msg/{name}")
     for name, message_class in kinds.items():
         first = random_message(message_class, random.Random(0))
 

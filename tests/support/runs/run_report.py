@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 SLOWEST = 15
+LAST_LINES = 30
 Row = tuple[int, float, float]
 """Number of tests, wall time and processor time [s]."""
 WALL, PROCESSOR = 1, 2
@@ -32,11 +33,20 @@ class RunReport:
         self._used_s = processor_s()
 
     @pytest.hookimpl(hookwrapper=True)
-    def pytest_runtest_makereport(self) -> Iterator[None]:
-        """Notes in a report how much processor time its phase took [s]; programs count when they have ended."""
+    def pytest_runtest_makereport(self, item: Any) -> Iterator[None]:
+        """Adds the processor time of a phase [s] to its report, and after a failure the last lines of all programs.
+
+        The processor time of a program counts when the program has ended.
+        """
         outcome: Any = yield
+        report = outcome.get_result()
         before, self._used_s = self._used_s, processor_s()
-        outcome.get_result().processor_s = self._used_s - before
+        report.processor_s = self._used_s - before
+        if report.failed and report.when == "call":
+            for system in (item.funcargs.get(name) for name in ("ros", "module_ros")):
+                for process in () if system is None else system.processes:
+                    lines = system.output(process).splitlines()[-LAST_LINES:]
+                    report.sections.append((f"End of the output of {process.args}", "\n".join(lines)))
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         """Adds a phase up, in the process that reports."""

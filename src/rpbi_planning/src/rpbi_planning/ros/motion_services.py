@@ -15,6 +15,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError, UnknownNameError, bounded
 from custom_ros_tools.ros.lifecycle.parameters import private_config
+from ros_pybullet_interface.msg import Prediction
 from rpbi.bodies.robots.robot import Robot
 from rpbi.ros.headers import world_frame
 from rpbi_planning import plan
@@ -33,6 +34,7 @@ from rpbi_planning.srv import (
 
 from .motion_messages import constraints_in, goal_in, positions_in, trajectory_message
 from .plan_markers import PlanMarkers
+from .prediction_client import SETTLING_S, distances_m, poses_at_end, predicted
 from .scene_topics import SceneTopics
 from .trajectory_client import TrajectoryClient
 
@@ -54,11 +56,13 @@ class _Outcome(NamedTuple):
 
 
 class _Planned(NamedTuple):
-    """A plan with its request, and the robot."""
+    """A plan with its request, the robot, and what the simulator predicts if that was asked for."""
 
     request: MotionRequest
     robot: Robot
     result: Any
+    prediction: Prediction | None = None
+    foreseen: str = ""
 
 
 class MotionServices:
@@ -94,11 +98,16 @@ class MotionServices:
             with self._work():
                 planned = self._plan(request.request, self._is_stopped)
         except (InterfaceError, ValueError) as error:
-            return PlanMotionResponse(False, bounded(str(error)), JointTrajectory(), time.monotonic() - start_s, "")
+            failed = PlanMotionResponse(success=False, message=bounded(str(error)))
+            failed.planning_time = time.monotonic() - start_s
+            return failed
         result = planned.result
         trajectory = trajectory_message(result.joint_names, result.trajectory) if result.success else JointTrajectory()
         message = result.message or f"a motion of {result.trajectory.duration_s:.2f} s"
-        return PlanMotionResponse(result.success, message, trajectory, time.monotonic() - start_s, result.planner)
+        message += f"; {planned.foreseen}" if planned.foreseen else ""
+        prediction = planned.prediction or Prediction()
+        planning_s = time.monotonic() - start_s
+        return PlanMotionResponse(result.success, message, trajectory, planning_s, result.planner, prediction)
 
     def _on_move(self, request: PlanAndMoveRequest) -> PlanAndMoveResponse:
         return PlanAndMoveResponse(*self._move(request.request, self._is_stopped, lambda _: None))
@@ -201,7 +210,21 @@ class MotionServices:
         planned = _Planned(request, robot, plan(scene, robot.name, goal, **options))
         if planned.result.success:
             self._show(planned)
+            if request.foresee:
+                planned = self._foresee(planned)
         return planned
+
+    def _foresee(self, planned: _Planned) -> _Planned:
+        """Adds the effects of a motion that starts at the present positions.
+
+        Raises:
+            InterfaceError: If the motion starts elsewhere, or the simulator cannot predict it.
+        """
+        if planned.request.start.name:
+            raise InterfaceError("foresee: expected no start, since the simulator predicts from its present state")
+        result, present = planned.result, self._topics.dynamic_objects()
+        found = predicted(planned.robot.name, result.joint_names, result.trajectory, present, self._topics.dt_s)
+        return planned._replace(prediction=found[0], foreseen=found[1])
 
     def _scene_for(self, request: MotionRequest, robot: Robot) -> PlanningScene:
         """Returns the present scene, in which the robot holds the bodies of a request and no others.
@@ -264,7 +287,8 @@ class MotionServices:
         for plans in range(1, MAX_PLANS + 1):
             block = self._execute(planned, plans, is_cancelled, report)
             if block is None:
-                return _Outcome(True, f"at the goal, after {plans} plan{'s' * (plans > 1)}", plans)
+                message = f"at the goal, after {plans} plan{'s' * (plans > 1)}{self._compared(planned)}"
+                return _Outcome(True, message, plans)
             report(MoveRobotFeedback(phase=PLANNING, plans=plans))
             end_s = time.monotonic() + self._config.wait_s
             while not is_cancelled():
@@ -312,6 +336,19 @@ class MotionServices:
         if client.fault:
             raise InterfaceError(client.fault)
         return None
+
+    def _compared(self, planned: _Planned) -> str:
+        """Returns the largest distance of a dynamic object from its foreseen place, as a clause; empty without one."""
+        if planned.prediction is None:
+            return ""
+        rospy.sleep(SETTLING_S)
+        foreseen = poses_at_end(planned.prediction)
+        present = {name: pose for name, pose in self._topics.dynamic_objects().items() if name in foreseen}
+        errors = distances_m(present, foreseen)
+        if not errors:
+            return f"; {planned.foreseen}"
+        worst = max(errors, key=lambda name: errors[name])
+        return f"; {planned.foreseen}; farthest from its foreseen place: '{worst}', {1e3 * errors[worst]:.1f} mm"
 
     def _require_start(self, planned: _Planned) -> None:
         result = planned.result

@@ -21,6 +21,7 @@ from custom_ros_tools.ros.tf_interface import TfListener
 from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import WorldCommand, WorldCommands
 from rpbi.bodies import Body
+from rpbi.bodies.dynamic import DynamicObject
 from rpbi.bodies.robots.robot import Robot
 from rpbi.bodies.visual_shapes import followed_frame, link_frame
 from rpbi.ros.headers import named_frame, prefixed, use_own_frames, use_prefix, world_frame
@@ -134,6 +135,23 @@ class SceneTopics:
             base = self.pose(frame, f"robot '{robot.name}'") if frame else Pose(*robot.base_pose())
             start = {names[index]: position for index, position in robot.joint_positions().items()}
             return base, {**start, **self._positions(robot)}
+
+    @property
+    def dt_s(self) -> float:
+        """Duration of a tick of the world [s]."""
+        assert self._world is not None
+        return self._world.config.timeStep
+
+    def dynamic_objects(self) -> dict[str, Pose]:
+        """Returns the present poses of the dynamic objects that TF contains, indexed by name.
+
+        Raises:
+            InterfaceError: If a pose is missing or too old.
+        """
+        with self.lock:
+            bodies = self._world.bodies.values() if self._world is not None else ()
+            frames = {each.name: self._frame_of(each) for each in bodies if isinstance(each, DynamicObject)}
+            return {name: self.pose(frame, f"body '{name}'") for name, frame in frames.items() if frame}
 
     def pose(self, frame: str, subject: str) -> Pose:
         """Returns the newest pose of a TF frame in the world.
