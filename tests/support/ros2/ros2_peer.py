@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import threading
@@ -179,6 +180,7 @@ def _result(future: Any, timeout_s: float = 60.0) -> Any:
 
 def main() -> None:
     rclpy.init()
+    gc.disable()  # the messages that are kept would be visited again and again
     peer, executor = Peer(), SingleThreadedExecutor()
     executor.add_node(peer)
 
