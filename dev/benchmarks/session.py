@@ -29,6 +29,8 @@ TYPES |= {"pointcloud": "sensor_msgs/PointCloud2"}
 TYPES |= {"diagnostics": "diagnostic_msgs/DiagnosticArray", "tf": "tf2_msgs/TFMessage"}
 TYPES |= {"segments": "geometry_msgs/PoseArray"}
 START_TIMEOUT_S = 60.0
+MAX_SHOWN = 4000
+"""Most characters of the output of a failed program that are shown."""
 CAMERA_POSE = "-0.32 -2.05 2.2 -0.346 0 -2.22".split()  # x y z [m], yaw pitch roll [rad]: the example's view
 
 
@@ -163,7 +165,7 @@ class Session:
             RuntimeError: If it fails.
         """
         if process.wait(timeout_s):
-            raise RuntimeError(f"{process.args} failed:\n{self.output(process)}")
+            raise RuntimeError(f"{process.args} failed:\n{self.output(process)[-MAX_SHOWN:]}")
         # PyBullet prints a lot around it
         found = [line for line in self.output(process).splitlines() if line.startswith("result: ")]
         return json.loads(found[-1].partition(": ")[2]) if found else None
