@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 import rospy
 import tf2_ros
+from real_robot import RealRobot
 from ros_system import RosSystem, wait_until
 
 from rpbi_examples.shelving import LEFT, RIGHT
@@ -20,12 +21,18 @@ def bookcase_of(buffer: tf2_ros.Buffer, box: str) -> str:
     return next((each.name for each in (LEFT, RIGHT) if each.has((place.x, place.y, place.z))), "")
 
 
-def test_all_boxes_come_into_the_other_bookcase(ros: RosSystem) -> None:
-    buffer = ros.listen_to_tf()
-    process = ros.start(["roslaunch", "rpbi_examples", "planning_example.launch", "headless:=true", "rounds:=1"])
+@pytest.mark.parametrize("real_robot", [False, True])
+def test_all_boxes_come_into_the_other_bookcase(ros: RosSystem, real_robot: bool) -> None:
+    buffer, real = ros.listen_to_tf(), RealRobot(ros) if real_robot else None
+    options = "headless:=true", "rounds:=1", f"real_robot:={real_robot}"
+    process = ros.start(["roslaunch", "rpbi_examples", "planning_example.launch", *options])
     wait_until(lambda: buffer.can_transform("rpbi/world", "rpbi/box_3", rospy.Time(0)), "there are boxes")
     assert {bookcase_of(buffer, box) for box in BOXES} == {LEFT.name}
+    if real is not None:
+        real.wait_until_moved()
     wait_until(lambda: process.poll() is not None, "the round has ended", SLOW_S)
     output = ros.output(process)
     assert {bookcase_of(buffer, box) for box in BOXES} == {RIGHT.name}, output
     assert all(f"{box} is in 'right_shelf'" in output for box in BOXES), output
+    if real is not None:
+        assert real.has_followed and "halted" not in output, output

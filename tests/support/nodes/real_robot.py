@@ -29,8 +29,13 @@ class RealRobot:
         messages = self._joints.messages
         return bool(messages) and np.abs(np.subtract(messages[-1].position, messages[0].position)).max() > MOVED_RAD
 
+    @property
+    def has_followed(self) -> bool:
+        """Whether the driver was in motion until its last message, without a reflex."""
+        state = self._states.messages[-1]
+        return bool(state.mode == DriverState.MOVE and state.reflexes == 0)
+
     def wait_until_moved(self) -> None:
         """Waits until a joint has gone some way; its driver must be in motion then, without a reflex."""
         wait_until(lambda: self.has_moved, "the real robot has moved", SLOW_S)
-        state = self._states.messages[-1]
-        assert state.mode == DriverState.MOVE and state.reflexes == 0, state.message
+        assert self.has_followed, self._states.messages[-1].message
