@@ -22,8 +22,9 @@ from robot_model.geometry import Pose
 from rpbi.world import World
 from rpbi_planning import JointGoal, PlannedTrajectory, PlanningScene, plan
 from rpbi_planning.certify import guard_of
-from rpbi_planning.collision import CollisionModel, Group
+from rpbi_planning.collision import CollisionModel
 from rpbi_planning.foresee import execute
+from rpbi_planning.group import Group
 from rpbi_planning.planner import length
 from safe_robot.check import CheckContext
 

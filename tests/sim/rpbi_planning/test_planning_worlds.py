@@ -13,10 +13,10 @@ from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import ConfigError
 from rpbi.world import World
 from rpbi_planning import JointGoal, NamedGoal, PlanningScene, PoseGoal, plan
-from rpbi_planning.collision import Group
 from rpbi_planning.console.plan import goal_of
 from rpbi_planning.console.plan import plan as command
 from rpbi_planning.foresee import execute
+from rpbi_planning.group import Group
 
 CONFIGS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs"
 PANDA, DUAL = (CONFIGS / f"basic_example_{name}/config.yaml" for name in ("panda", "dual_iiwa"))

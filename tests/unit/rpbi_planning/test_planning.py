@@ -26,8 +26,9 @@ from rpbi_planning import (
     Upright,
     plan,
 )
-from rpbi_planning.collision import CollisionModel, Group
+from rpbi_planning.collision import CollisionModel
 from rpbi_planning.constraints import BoundConstraint
+from rpbi_planning.group import Group
 from rpbi_planning.planning import PlanResult
 
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"

@@ -8,7 +8,7 @@ from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
 
-from .collision import Group
+from .group import Group
 from .scene import PlanningScene, SceneRobot
 from .timing import PathTiming, PlannedTrajectory
 

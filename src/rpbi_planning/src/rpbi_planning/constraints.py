@@ -13,7 +13,7 @@ import numpy as np
 from custom_ros_tools.transforms import matrix_of
 from robot_model.geometry import Vector
 
-from .collision import Group
+from .group import Group
 from .yaml_words import built
 
 Array = np.ndarray

@@ -9,7 +9,7 @@ import numpy as np
 
 from rpbi.world.forks.prediction import PlannedInput
 
-from .collision import Group
+from .group import Group
 from .timing import PlannedTrajectory
 
 if TYPE_CHECKING:

@@ -8,7 +8,9 @@ import numpy as np
 
 from custom_ros_tools.transforms import Array
 
-from .collision import CollisionModel, Group, JointMotion
+from .collision import CollisionModel
+from .group import Group
+from .proofs import JointMotion
 from .scene import PlanningScene
 
 SHARE = 0.5

@@ -12,8 +12,9 @@ import numpy as np
 
 from custom_ros_tools.schema import ConfigModel
 
-from .collision import CollisionModel, Group
+from .collision import CollisionModel
 from .constraints import BoundConstraint
+from .group import Group
 
 Array = np.ndarray
 

@@ -16,9 +16,10 @@ from safe_robot.commands.escape import find_escape
 from safe_robot.limits import MotionLimits
 
 from .certify import certified
-from .collision import CollisionModel, Group, Meeting, collision_model
+from .collision import CollisionModel, Meeting, collision_model
 from .constraints import BoundConstraint, PathConstraint
 from .goals import PlanningGoal
+from .group import Group
 from .planner import PlanningProblem, length
 from .planners import PLANNERS
 from .scene import PlanningScene
