@@ -9,7 +9,8 @@ from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
 
 from .group import Group
-from .scene import PlanningScene, SceneRobot
+from .scene import PlanningScene
+from .scene_robot import SceneRobot
 from .timing import PathTiming, PlannedTrajectory
 
 PERIOD_S = 0.02

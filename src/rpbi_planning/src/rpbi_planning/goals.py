@@ -17,7 +17,8 @@ from ik_ros.solvers.global_search import GlobalConfig, GlobalSolver
 from robot_model.geometry import Pose, Vector
 from robot_model.limits import Limits
 
-from .scene import PlanningScene, SceneRobot
+from .scene import PlanningScene
+from .scene_robot import SceneRobot
 from .yaml_words import built
 
 Array = np.ndarray

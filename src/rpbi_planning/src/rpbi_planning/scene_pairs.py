@@ -23,7 +23,8 @@ except ImportError:
 from robot_model.collision.fcl import FclShapes, Hull, hull_of, hulls_of_links
 
 from .group import Array, Group
-from .scene import PlanningScene, SceneRobot
+from .scene import PlanningScene
+from .scene_robot import SceneRobot
 
 NEAR_M = 1e-3
 """Pairs of links that are nearly always nearer than this beyond the padding are near by construction, and left out."""

@@ -29,7 +29,8 @@ from rpbi.world import World
 from rpbi.world.saved.command_log import RecordedCommand, apply_command
 from rpbi.world.saved.description import WorldDescription
 from rpbi_planning.node_configs import MotionPlannerConfig
-from rpbi_planning.scene import PlanningScene, SceneRobot
+from rpbi_planning.scene import PlanningScene
+from rpbi_planning.scene_robot import SceneRobot
 
 FIRST_S, POLL_S = 10.0, 0.05
 """Longest time to wait for the first messages, and time between two looks [s]."""
