@@ -72,8 +72,9 @@ def draw_contacts(path: Path) -> None:
 
 def draw_bases(path: Path) -> None:
     """Draws a mobile base that has driven a curve, its path, and its commanded velocity."""
-    camera = Photographer((-3.5, 0.2, 1.75), (-0.68, 0.86, 0.3), 30.0, (1000, 620))
+    camera = Photographer((-3.4, -0.35, 1.75), (-0.5, 0.3, 0.32), 30.0, (1000, 620))
     world = World.from_file(f"{CONFIGS}/basic_example_mobile_base/config.yaml")
+    world.remove("box")
     base: Any = world.bodies["mobile_base"]
     places = []
     for tick in range(round(DRIVEN_S / world.config.timeStep)):
@@ -189,7 +190,9 @@ def draw_robot_model(path: Path) -> None:
             for column, colour in enumerate(AXES):
                 view.line([tuple(origin), tuple(origin + AXIS_M * matrix[:3, column])], colour, 5.0)
     for column, offset_px in enumerate(((9, 0), (-19, -4), (-21, 20))):
-        view.words(tuple((base @ root)[:3, 3] + AXIS_M * (base @ root)[:3, column]), "xyz"[column], AXES[column], offset_px)
+        view.words(
+            tuple((base @ root)[:3, 3] + AXIS_M * (base @ root)[:3, column]), "xyz"[column], AXES[column], offset_px
+        )
     write_png(path, view.picture(), dither=True)
 
 

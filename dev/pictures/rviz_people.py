@@ -229,7 +229,11 @@ def tracking(path: Path) -> None:
             for name in boxes:
                 look_at(ORIGINS[name] + place_of("laboratory") * (1.0, 1.0, 0.0))
                 parts.append(stage.still_picture())
-                label(parts[-1], f"{name}: centre {100.0 * place_of(name)[2]:.0f} cm above the floor", (stage.width // 2, 24))
+                label(
+                    parts[-1],
+                    f"{name}: centre {100.0 * place_of(name)[2]:.0f} cm above the floor",
+                    (stage.width // 2, 24),
+                )
             for name in worlds.values():
                 call(f"{name}/rpbi/start")
             carry(True)

@@ -57,7 +57,7 @@ def planning(path: Path) -> None:
         *steps, transport = carry(tuple(map(float, box)), LEFT, RIGHT)[:6]
         for step in steps:
             if step.finger is None:
-                wait_until(lambda: move(motion_request(BOX, step, 1)).success, "the hand moves")
+                wait_until(lambda step=step: move(motion_request(BOX, step, 1)).success, "the hand moves")
             else:
                 fingers.publish(JointState(name=[FINGER], position=[step.finger]))
                 rospy.sleep(FINGERS_S)

@@ -119,7 +119,12 @@ def clutter_rviz(path: Path) -> None:
     whole = Image.new("RGB", (1280, 640), "white")
     whole.paste(picture)
     inset(whole, colour_image(colour.message).resize((412, 316)), "colour image", (866, 2))
-    inset(whole, depth_image(depth.message, 0.5, NEAR_M).resize((412, 316)), f"depth: 0.5 m is yellow, {NEAR_M:g} m violet", (866, 322))
+    inset(
+        whole,
+        depth_image(depth.message, 0.5, NEAR_M).resize((412, 316)),
+        f"depth: 0.5 m is yellow, {NEAR_M:g} m violet",
+        (866, 322),
+    )
     label(whole, "RViz: point cloud, frames", (124, 20))
     write_png(path, whole, dither=True)
 

@@ -66,7 +66,7 @@ ROBOTS = {
     "ur5e": View((1.3, -1.1, 1.0), (0.25, 0.0, 0.28), 27.0),
     "kinova": View((1.1, -1.1, 0.9), (0.0, 0.0, 0.4), 32.0),
     "nextage": View((1.7, -1.1, 1.7), (0.0, 0.0, 1.0), 42.0),
-    "mobile_base": View((0.0, -2.1, 1.3), (-1.15, 0.0, 0.36), 32.0),
+    "mobile_base": View((0.8, -2.3, 1.25), (-0.72, -0.8, 0.4), 32.0),
     "human_model": View((2.6, -1.6, 1.6), (0.0, 0.0, 0.88), 34.0),
 }
 """Views of the robots of the basic examples, without Talos, which is in a scene."""

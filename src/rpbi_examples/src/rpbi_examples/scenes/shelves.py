@@ -31,8 +31,8 @@ DEPTHS_M, OFF_M = (0.75, 0.79), 0.04
 INTO = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 """Orientation of the link whose z axis points into the bookcase."""
 SHOULDER_M, HAND_M, REACH_M = 0.36, 0.081, 0.8
-"""Height of the shoulder above the base, distance of the link from the wrist, and largest distance of the wrist of a goal
-from the shoulder, 20 mm less than that of a stretched arm [m]; see joints 2, 4, 6 and 7 in the URDF.
+"""Height of the shoulder above the base, distance of the link from the wrist, and largest distance of the wrist of a
+goal from the shoulder, 20 mm less than that of a stretched arm [m]; see joints 2, 4, 6 and 7 in the URDF.
 """
 GOALS = 2
 """Number of goals of each arm."""
