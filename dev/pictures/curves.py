@@ -52,6 +52,10 @@ START_M_S, CHANGE_S, SLIDES_S = 2.0, 0.1, 1.0
 """First speed of the sliding box [m/s], time of the change of its friction, and time that the plot shows [s]."""
 EPISODES, EPISODE_S = 20, 2.0
 """Number of the farm's episodes, and their longest duration [s]."""
+EQUAL_MM, EQUAL_AFTER_S = 0.1, 0.2
+"""Largest difference of errors that are drawn as one line [mm], except just after the target has begun to move [s]."""
+BESIDE: Mapping[str, Any] = {"textcoords": "offset points", "weight": "bold"}
+"""Style of texts at lines."""
 IK_HZ, SHOWN_S, SETTLES_S = 100.0, 20.0, 3.0
 """Problems in a second, time that the plot shows, and time in which the arm moves to the start of the figure [s]."""
 
@@ -81,15 +85,21 @@ def draw_streams(path: Path) -> None:
 
 def draw_ik_errors(path: Path) -> None:
     """Draws the distance between tip and moving target over time, for three solvers with equal errors, and trac_ik."""
-    figure, axes = new_figure(2, 1, (9.0, 5.0), sharex=True, height_ratios=(1.0, 1.4))
-    for name, width, style in (("kdl", 4.5, "-"), ("pybullet", 2.0, "-"), ("tasks", 1.6, ":"), ("trac_ik", 1.0, "-")):
-        times_s, distances_mm = _followed(name)
-        label = f"{name}: median {np.median(distances_mm):.1f}, largest {distances_mm.max():.1f} mm"
-        axes[name == "trac_ik"].plot(times_s, distances_mm, style, lw=width, label=label)
-    for each in axes:
-        each.set(ylim=(0.0, None), xlim=(0.0, SHOWN_S), ylabel="tip to target [mm]")
-        each.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.0, fontsize=9.5)
-    axes[-1].set_xlabel("time since the target began to move [s]")
+    figure, (axes,) = new_figure(1, 1, (9.0, 4.2))
+    errors_mm = {name: _followed(name) for name in ("kdl", "pybullet", "tasks", "trac_ik")}
+    times_s, equal_mm = errors_mm["kdl"]
+    for name in ("pybullet", "tasks"):
+        differences = np.abs(errors_mm[name][1] - equal_mm)[times_s > EQUAL_AFTER_S]
+        assert differences.max() < EQUAL_MM, f"{name} differs by {differences.max():.2f} mm from kdl"
+    axes.plot(*errors_mm["trac_ik"], color=ORANGE, lw=1.2)
+    axes.plot(times_s, equal_mm, color=BLUE, lw=2.6)
+    highest = int(np.argmax(errors_mm["trac_ik"][1]))
+    peak, side = (times_s[highest], errors_mm["trac_ik"][1][highest]), "left" if times_s[highest] < 9.0 else "right"
+    offset = 8 if side == "left" else -8, -4
+    axes.annotate("trac_ik: peaks where it changes posture", peak, offset, color=ORANGE, ha=side, **BESIDE)
+    axes.annotate("kdl, pybullet and tasks: equal", (times_s[-1], 0.9), (-220, 0), color=BLUE, **BESIDE)
+    axes.set(ylim=(0.0, None), xlim=(0.0, SHOWN_S), xticks=range(0, round(SHOWN_S) + 1, 2))
+    axes.set(xlabel="time since the target began to move [s]", ylabel="distance from tip to target [mm]")
     save(figure, path)
 
 
@@ -123,8 +133,11 @@ def draw_trajectories(path: Path) -> None:
 
 def draw_dynamics(path: Path) -> None:
     """Draws the speed of a box that slides over the floor, while a call changes its friction."""
-    figure, (axes,) = new_figure(1, 1, (8.6, 3.4))
-    for friction, colour in ((0.7, GREY), (0.1, BLUE)):
+    figure, (axes,) = new_figure(1, 1, (8.6, 3.6))
+    for friction, colour, words, at in (
+        (0.7, GREY, "friction stays at 0.7", (0.275, 0.1)),
+        (0.1, BLUE, "friction lowered from 0.7 to 0.1", (0.42, 1.02)),
+    ):
         with tempfile.TemporaryDirectory(prefix="rpbi-") as folder:
             keys = {"resetBaseVelocity": {"linearVelocity": [-START_M_S, 0.0, 0.0]}}
             world = example(Path(folder), box=keys)
@@ -136,12 +149,11 @@ def draw_dynamics(path: Path) -> None:
                 world.step()
                 rows.append((world.clock.time_s, np.linalg.norm(box.pb.getBaseVelocity(box.body_id)[0][:2])))
             world.close()
-        label = "lateralFriction stays at 0.7" if friction == 0.7 else "change_dynamics sets 0.1"
-        axes.plot(*np.transpose(rows), color=colour, label=label)
+        axes.plot(*np.transpose(rows), color=colour, lw=2.4, clip_on=False)
+        axes.annotate(words, at, (8, 4), color=colour, **BESIDE)
     axes.axvline(CHANGE_S, color=ORANGE, lw=1.2, ls="--")
-    axes.annotate("the friction changes", (CHANGE_S, START_M_S), (6, -4), textcoords="offset points", color=ORANGE)
+    axes.annotate("change_dynamics is called", (CHANGE_S, START_M_S), (6, -4), textcoords="offset points", color=ORANGE)
     axes.set(xlabel="time [s]", ylabel="speed of the box [m/s]", ylim=(0.0, None), xlim=(0.0, SLIDES_S))
-    legend_below(figure, axes, 2)
     save(figure, path)
 
 

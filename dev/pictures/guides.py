@@ -17,7 +17,7 @@ from PIL import Image
 from pushes import example, push
 from render import Photographer, beside, with_caption
 
-from custom_ros_tools.plot_style import BLUE, INK, ORANGE, X, Y, Z
+from custom_ros_tools.plot_style import BLUE, INK, ORANGE
 from robot_model.asset_files import find_file
 from robot_model.geometry import Pose, Vector, plus, scaled
 from robot_model.model import RobotModel
@@ -47,8 +47,8 @@ ABOVE_M = 1.75
 """Height of the cube in the first picture of the soft body [m]."""
 CARRIED_S = 1.0
 """Time for which the belt of the template has carried the parcel [s]."""
-AXIS_M = 0.09
-"""Length of the drawn axes [m]."""
+AXIS_M, AXES = 0.11, ("#e02020", "#18a018", "#2050f0")
+"""Length of the drawn axes [m], and their colours, as in RViz: red, green, blue."""
 
 
 def draw_contacts(path: Path) -> None:
@@ -72,8 +72,9 @@ def draw_contacts(path: Path) -> None:
 
 def draw_bases(path: Path) -> None:
     """Draws a mobile base that has driven a curve, its path, and its commanded velocity."""
-    camera = Photographer((-2.3, -2.3, 1.9), (-0.6, 0.0, 0.15), 31.0, (900, 560))
+    camera = Photographer((-3.4, -0.35, 1.75), (-0.5, 0.3, 0.32), 30.0, (1000, 620))
     world = World.from_file(f"{CONFIGS}/basic_example_mobile_base/config.yaml")
+    world.remove("box")
     base: Any = world.bodies["mobile_base"]
     places = []
     for tick in range(round(DRIVEN_S / world.config.timeStep)):
@@ -91,7 +92,8 @@ def draw_bases(path: Path) -> None:
     front = pose @ Pose((0.35, 0.0, 0.02))
     ahead = pose @ Pose((0.85, 0.0, 0.02))
     view.arrow(front.position, ahead.position, ORANGE)
-    view.words(ahead.position, f"{CURVE.linear[0]:g} m/s, {CURVE.angular[2]:g} rad/s", ORANGE, (-60, 34))
+    command = f"command: {CURVE.linear[0]:g} m/s ahead, {CURVE.angular[2]:g} rad/s to the left"
+    view.words(ahead.position, command, ORANGE, (-60, 34))
     view.words(places[len(places) // 2], "path", BLUE, (14, 12))
     write_png(path, view.picture(), dither=True)
 
@@ -168,24 +170,29 @@ def draw_robot_model(path: Path) -> None:
     world = World.from_file(f"{CONFIGS}/basic_example_kuka_lwr/config.yaml")
     robot = RobotModel(find_file("{rpbi_examples}/robots/kuka_lwr.urdf", "~"))
     world.act("kuka_lwr", "set_joint_state", dict(zip(robot.joint_names, POSTURE)))
+    world.remove("box")
     arm: Any = world.bodies["kuka_lwr"]
     base = np.array(_matrix(arm.base_pose()))
-    camera = Photographer((-0.9, -1.35, 0.85), (0.22, 0.05, 0.45), 32.0, (900, 620))
+    camera = Photographer((-0.95, -1.5, 0.95), (0.12, 0.02, 0.4), 29.0, (1000, 640))
     view = Overlay(camera, camera.picture(world))
     world.close()
     frames = robot.frames.of_links(np.array([POSTURE]))[0]
+    hand = frames[robot.frames.links.index("lwr_arm_7_link")]
+    x, y, z = hand[:3, 3]
+    words = f"lwr_arm_7_link: x {x:.3f}, y {y:.3f}, z {z:.3f} m in the base"
+    view.pointer(tuple((base @ hand)[:3, 3]), words, (-432, -130))
+    root = frames[robot.frames.links.index("lwr_arm_0_link")]
+    view.pointer(tuple((base @ root)[:3, 3]), "lwr_arm_0_link: the base", (80, 75))
     for name, frame in zip(robot.frames.links, frames):
         if name.startswith("lwr_arm_") and name[-6].isdigit():
             matrix = base @ frame
             origin = matrix[:3, 3]
-            for column, colour in enumerate((X, Y, Z)):
-                end = tuple(origin + AXIS_M * matrix[:3, column])
-                view.line([tuple(origin), end], colour, 4.0)
-                if name == "lwr_arm_0_link":
-                    view.words(end, "xyz"[column], colour, (4, -4))
-    hand = frames[robot.frames.links.index("lwr_arm_7_link")]
-    words = "lwr_arm_7_link: {:.3f}, {:.3f}, {:.3f} m in the base".format(*hand[:3, 3])
-    view.pointer(tuple((base @ hand)[:3, 3]), words, (-330, -110))
+            for column, colour in enumerate(AXES):
+                view.line([tuple(origin), tuple(origin + AXIS_M * matrix[:3, column])], colour, 5.0)
+    for column, offset_px in enumerate(((9, 0), (-19, -4), (-21, 20))):
+        view.words(
+            tuple((base @ root)[:3, 3] + AXIS_M * (base @ root)[:3, column]), "xyz"[column], AXES[column], offset_px
+        )
     write_png(path, view.picture(), dither=True)
 
 

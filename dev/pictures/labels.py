@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib import colormaps
 from PIL import Image, ImageDraw
 from render import font
 from sensor_msgs.msg import Image as ImageMessage
@@ -75,7 +76,9 @@ def colour_image(message: ImageMessage) -> Image.Image:
 
 
 def depth_image(message: ImageMessage, near_m: float, far_m: float) -> Image.Image:
-    """Returns a camera's depth image, encoding `32FC1`, in grey: near is dark, far is bright."""
+    """Returns a camera's depth image, encoding `32FC1`, in colours: near is yellow, far is violet, beyond is white."""
     metres = np.frombuffer(message.data, np.float32).reshape(message.height, message.width)
-    grey = np.clip((metres - near_m) / (far_m - near_m), 0.0, 1.0) * 255.0
-    return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
+    shares = (metres - near_m) / (far_m - near_m)
+    colours = colormaps["viridis_r"](np.clip(shares, 0.0, 1.0), bytes=True)[:, :, :3]
+    colours[~(shares < 1.0)] = 255
+    return Image.fromarray(colours)

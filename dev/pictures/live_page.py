@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+import signal
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import numpy as np
+import rosgraph
 from files import write_png
 from labels import label
 from PIL import Image
@@ -23,10 +29,11 @@ from chromium import Tab, browser
 from rviz_worlds import PUSH_N, RVIZ, push_n
 from viewer import Viewer
 
-SIZE = (1280, 880)
+SIZE, FINENESS = (960, 760), 1.5
+"""Size of the page in its own pixels, and pixels of the picture for each of them, so that its words are readable."""
 IMAGE = "rpbi/camera/colour/image/compressed"
-CAMERA = "initialCameraPosition=2.2,-3.3,2.3&initialCameraLookAt=0.3,-0.6,0.7"
-"""Position of the page's camera, and point that it looks at [m], from which the camera of the world is seen."""
+CAMERA = "initialCameraPosition=0.75,-1.65,1.1&initialCameraLookAt=0.53,0.0,0.27"
+"""Position of the page's camera, and point that it looks at [m]: the arm is to the left of the panel."""
 CLOSE = "[...document.querySelectorAll('[class*=Notification-closeButton]')].map((each) => each.click()).length"
 DRAWN_S = 5.0
 """Time in which the page has drawn the stopped world [s]."""
@@ -36,16 +43,19 @@ HALF = (600, 520)
 """Size of the picture of RViz, and of that of the browser next to it [px]."""
 PAGE_WIDTH = 1280
 """Width of the page, of which the middle is shown: the panel is to the right of it [px]."""
-STARTS_S = 5.0
-"""Simulated time at which the worlds next to each other are stopped [s]."""
+SCENE = "/scene"
+"""Node that steps the world of a scene."""
 
 
 def draw_browser(path: Path) -> None:
-    """The demo in the browser: the arm pushes the box; sliders, and the image of the camera at its frustum."""
+    """The demo in the browser: the arm pushes the box; sliders, and the image of the camera."""
     with Stage(640, 480, scale=1) as stage, browser(*SIZE) as chromium, tempfile.TemporaryDirectory() as folder:
         stage.launch("basic_example_kuka_lwr.launch", "real_time_factor:=0.2")
         link = _start_view(stage, Path(folder))
         tab = chromium.tab()
+        width, height = SIZE
+        screen = {"width": width, "height": height, "deviceScaleFactor": FINENESS, "mobile": False}
+        tab.call("Emulation.setDeviceMetricsOverride", **screen)
         tab.open(f"{link}?{CAMERA}")
         tab.wait("document.body.innerText.includes('Time line')", 300.0)
         with Viewer(link) as viewer:
@@ -67,16 +77,21 @@ def draw_browser_demo(path: Path) -> None:
 
 def draw_browser_factory(path: Path) -> None:
     """The scene `factory` in RViz and in the browser."""
-    _draw_beside(path, "factory", (1.5, 0.5, 1.9), (0.3, 0.02, 0.9))
+    _draw_beside(path, "factory", (1.55, 0.35, 1.75), (0.25, 0.02, 1.0), starts_s=12.0)
 
 
 def draw_browser_talos(path: Path) -> None:
     """The scene `talos` in RViz and in the browser."""
-    _draw_beside(path, "talos", (2.2, 1.8, 1.5), (0.15, 0.0, 0.9))
+    _draw_beside(path, "talos", (2.0, 1.6, 1.5), (0.1, 0.0, 0.92), starts_s=3.8)
 
 
 def _draw_beside(
-    path: Path, name: str, eye: tuple[float, ...], focus: tuple[float, ...], hidden: tuple[str, ...] = ()
+    path: Path,
+    name: str,
+    eye: tuple[float, ...],
+    focus: tuple[float, ...],
+    hidden: tuple[str, ...] = (),
+    starts_s: float = 5.0,
 ) -> None:
     """Draws one tick of an example in RViz, and in the browser with the same camera.
 
@@ -86,15 +101,18 @@ def _draw_beside(
         eye: Position of the camera [m].
         focus: Point that it looks at [m].
         hidden: Displays of RViz that are left out.
+        starts_s: Simulated time at which the world is stopped [s].
     """
     away = np.subtract(eye, focus)
     distance_m = float(np.linalg.norm(away))
     orbit = {"Pitch": math.asin(away[2] / distance_m), "Yaw": math.atan2(away[1], away[0]) % (2.0 * math.pi)}
     camera = f"initialCameraPosition={','.join(map(str, eye))}&initialCameraLookAt={','.join(map(str, focus))}"
-    with Stage(*HALF) as stage, browser(PAGE_WIDTH, HALF[1]) as chromium, tempfile.TemporaryDirectory() as folder:
+    with ExitStack() as exits:
+        stage, folder = exits.enter_context(Stage(*HALF)), exits.enter_context(tempfile.TemporaryDirectory())
+        chromium = exits.enter_context(browser(PAGE_WIDTH, HALF[1]))
         stage.launch(f"{name}.launch")
-        next_message("rpbi/state", SimulationState, lambda each: each.simulated_time > STARTS_S)
-        stage.stop_world()
+        next_message("rpbi/state", SimulationState, lambda each: each.simulated_time > starts_s)
+        exits.enter_context(_stopped(stage))
         without = dict.fromkeys(hidden)
         stage.rviz(RVIZ / f"{name}.rviz", without, Distance=distance_m, Focal_Point=dict(zip("XYZ", focus)), **orbit)
         rviz = stage.still_picture()
@@ -108,6 +126,22 @@ def _draw_beside(
     label(rviz, "RViz", (60, 24))
     label(page, "browser", (60, 24))
     write_png(path, beside(rviz, page))
+
+
+@contextmanager
+def _stopped(stage: Stage) -> Iterator[None]:
+    """Stops the world, and the process of the node that steps it, if there is one, until the `with` block ends."""
+    master = rosgraph.Master("/pictures")
+    if SCENE not in {node for _, nodes in master.getSystemState()[0] for node in nodes}:
+        stage.stop_world()
+        yield
+        return
+    process_id = ServerProxy(master.lookupNode(SCENE)).getPid("/pictures")[2]
+    os.kill(process_id, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(process_id, signal.SIGCONT)
 
 
 def _start_view(stage: Stage, folder: Path) -> str:

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 import rospy
 from files import write_png
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3, WrenchStamped
 from labels import label
 from live import Array, Frames, Newest, Orbit, grab, place, xdotool
 from PIL import Image, ImageDraw
 from render import beside, with_caption
 from screen import Stage, call, wait_until
-from std_msgs.msg import Float64
+from std_msgs.msg import ColorRGBA, Float64
 from std_srvs.srv import SetBool
+from tf2_ros import StaticTransformBroadcaster
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rpbi_examples.dressing.outcome import rings_of
@@ -30,12 +31,12 @@ ARRIVES_S = 1.0
 """Time in which all messages of a stopped world arrive [s]."""
 RESTS_S = 3.0
 """Time after which the arm rests on the box, and after which RViz shows all segments of people [s]."""
-TWIN = np.array((0.0, 1.2, -0.01))
-"""Place of the twin's world in that of the laboratory, for RViz [m]."""
-PART_PX = 420
-"""Rows and columns of the part of RViz's view that shows one of two worlds [px]."""
-CAMERA_YAW_RAD = -0.8
-"""Direction of the camera as seen from the avatar [rad]."""
+ORIGINS = {"laboratory": np.zeros(3), "twin": np.array((0.0, 1.2, -0.01))}
+"""Origins of both worlds in that of the laboratory, for RViz [m]."""
+CAMERA_YAW_RAD, BESIDE_RAD = -0.8, 0.75
+"""Direction of the camera as seen from the avatar, and its angle to the direction of the avatar's right side [rad]."""
+SEGMENTS = {"Head": (-110, 34), "RightHand": (10, 60), "Pelvis": (-90, 20), "LeftFoot": (80, -10)}
+"""Segments whose frames have labels, and the offsets of these labels [px]."""
 BALL, TIP = "rpbi/teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 """Frames of the ball that a person moves, and of the arm's tip, which follows it."""
 
@@ -142,54 +143,76 @@ def avatar_walking(path: Path) -> None:
         stage.launch("avatar.launch")
         frames, world = Frames("rpbi/human/Pelvis"), Frames("rpbi/world")
         frames.wait_for("rpbi/human/RightHand")
-        view = Orbit(2.5, (0.1, 0.0, -0.05), 0.25, CAMERA_YAW_RAD)
+        view = Orbit(2.4, (0.05, 0.0, -0.05), 0.3, CAMERA_YAW_RAD)
         stage.rviz(RVIZ / "avatar.rviz", **{**view.properties, "Target Frame": "rpbi/human/Pelvis"})
 
         def part(name: str) -> Array:
             return frames.wait_for(f"rpbi/human/{name}")
 
-        def shows_right_side() -> bool:
-            """Returns whether the right side of the avatar points to the camera."""
+        def is_seen_from_ahead() -> bool:
+            """Returns whether the camera sees the right side and the front of the avatar, both from ahead."""
             right, left = (world.wait_for(f"rpbi/human/{side}UpperArm") for side in ("Right", "Left"))
-            x, y, _ = (right - left) / np.linalg.norm(right - left)
-            return bool(x * np.cos(CAMERA_YAW_RAD) + y * np.sin(CAMERA_YAW_RAD) > 0.9)
+            x, y, _ = right - left
+            to_camera = CAMERA_YAW_RAD - np.arctan2(y, x)  # the front is at +90 degrees of the right side
+            return bool(abs((to_camera - BESIDE_RAD + np.pi) % (2.0 * np.pi) - np.pi) < 0.25)
 
         def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
-            stop_when(stage, lambda: shows_right_side() and condition())
+            stop_when(stage, lambda: is_seen_from_ahead() and condition())
             picture = stage.still_picture()
             call("rpbi/start")
             return with_caption(picture, meaning)
 
         pictures = (
-            moment(lambda: part("RightFoot")[0] - part("LeftFoot")[0] > 0.4, "a stride"),
-            moment(lambda: part("RightHand")[0] > 0.45, "the right hand reaches forward"),
+            moment(lambda: part("RightFoot")[0] - part("LeftFoot")[0] > 0.4, "The avatar walks."),
+            moment(lambda: part("RightHand")[0] > 0.45, "Its right hand reaches forward."),
         )
     write_png(path, beside(*pictures))
 
 
 def mvn(path: Path) -> None:
-    """Draws two people of the emulator, with the frames of their segments."""
-    with Stage(900, 640) as stage:
+    """Draws two people of the emulator, with the frames of their segments and the names of some."""
+    with Stage(1000, 640) as stage:
         stage.launch("mvn.launch", "people:=2", "arm_held_out:=true")
-        view = Orbit(3.1, (0.0, -0.3, 0.85), 0.3, 0.5)
-        stage.rviz(RVIZ / "mvn.rviz", {"TF": {"Marker Scale": 0.35}}, **view.properties)
+        frames = Frames()
+        frames.wait_for("mvn/1/Pelvis")
+        view = Orbit(2.75, (0.0, -0.35, 0.86), 0.22, 0.42)
+        stage.rviz(RVIZ / "mvn.rviz", {"TF": {"Marker Scale": 0.5}}, **view.properties)
         time.sleep(RESTS_S)
         picture = stage.picture()
+        for name, (right, down) in SEGMENTS.items():
+            column, row = view.pixel(frames.wait_for(f"mvn/0/{name}"), picture)
+            label(picture, f"mvn/0/{name}", (column + right, row + down), (column, row))
     write_png(path, picture)
 
 
 def tracking(path: Path) -> None:
     """Draws both worlds while the box is seen, and while it is hidden and that of the twin has fallen."""
-    with Stage(1480, 620) as stage:
+    with Stage(400, 380) as stage:
         stage.launch("tracking_example.launch")
-        frames = Frames("lab/rpbi/world")
-        boxes = {name: f"{name}/rpbi/box" for name in ("lab", "twin")} | {"lab": "lab/figure_eight"}
-        view = Orbit(1.25, (0.0, 0.6, 0.2), 0.75, 0.0)
-        stage.rviz(RVIZ / "tracking_example.rviz", {"TF": None}, **view.properties)
+        frames, focus = Frames("lab/rpbi/world"), StaticTransformBroadcaster()
+        boxes = {"laboratory": "lab/figure_eight", "twin": "twin/rpbi/box"}
+        worlds = {"laboratory": "lab", "twin": "twin"}
+        shadows = rospy.Publisher("/pictures/shadows", MarkerArray, queue_size=1, latch=True)
+
+        def look_at(place: Array) -> None:
+            """Moves RViz's view to a place [m]."""
+            transform = TransformStamped(child_frame_id="pictures/focus")
+            transform.header.frame_id, transform.header.stamp = "lab/rpbi/world", rospy.Time.now()
+            transform.transform = Transform(Vector3(*place), Quaternion(0.0, 0.0, 0.0, 1.0))
+            focus.sendTransform(transform)
+
+        look_at(np.zeros(3))
+        view = Orbit(0.92, (0.0, 0.0, 0.17), 0.68, 0.6)
+        shown = {"TF": None, "Shadows": {"Class": "rviz/MarkerArray", "Marker Topic": "/pictures/shadows"}}
+        stage.rviz(RVIZ / "tracking_example.rviz", shown, **{**view.properties, "Target Frame": "pictures/focus"})
+
+        def place_of(name: str) -> Array:
+            """Returns the place of a box in its own world [m]."""
+            return np.asarray(frames.wait_for(boxes[name]) - ORIGINS[name])
 
         def apart() -> float:
             """Returns the distance of the twin's box from where the laboratory's box is in its world [m]."""
-            return float(np.linalg.norm(frames.wait_for(boxes["twin"]) - frames.wait_for(boxes["lab"]) - TWIN))
+            return float(np.linalg.norm(place_of("twin") - place_of("laboratory")))
 
         def carry(is_on: bool) -> None:
             """Moves the box of the laboratory, or holds it."""
@@ -198,33 +221,46 @@ def tracking(path: Path) -> None:
         def moment(condition: Callable[[], bool], meaning: str, caption: str) -> Image.Image:
             wait_until(condition, meaning)
             carry(False)
-            for name in boxes:
+            for name in worlds.values():
                 stage.stop_world(name)
-            scene = stage.still_picture()
+            time.sleep(ARRIVES_S)
+            shadows.publish(MarkerArray([shadow(place_of(name) + ORIGINS[name], n) for n, name in enumerate(boxes)]))
             parts = []
-            for name, middle in (("laboratory", np.zeros(3)), ("twin", TWIN)):
-                x, y = map(round, view.pixel(middle + (0.0, 0.0, 0.2), scene))
-                part = scene.crop((x - PART_PX // 2, y - PART_PX // 2, x + PART_PX // 2, y + PART_PX // 2))
-                label(part, name, (PART_PX // 2, 20))
-                parts.append(part)
             for name in boxes:
+                look_at(ORIGINS[name] + place_of("laboratory") * (1.0, 1.0, 0.0))
+                parts.append(stage.still_picture())
+                label(
+                    parts[-1],
+                    f"{name}: centre {100.0 * place_of(name)[2]:.0f} cm above the floor",
+                    (stage.width // 2, 24),
+                )
+            for name in worlds.values():
                 call(f"{name}/rpbi/start")
             carry(True)
             return with_caption(beside(*parts, gap_px=2), caption)
 
         def is_in_the_middle() -> bool:
-            return bool(abs(frames.wait_for(boxes["lab"])[1]) < 0.1)
+            return bool(abs(place_of("laboratory")[1]) < 0.1)
 
         def is_on_floor() -> bool:
-            return bool(frames.wait_for(boxes["twin"])[2] < 0.05 + TWIN[2] + 0.005)
+            return bool(place_of("twin")[2] < 0.055)
 
         seen = moment(
             lambda: apart() < 0.02 and is_in_the_middle(),
             "Vicon sees the box",
-            "The box is seen: both boxes are at the same place",
+            "Vicon sees the box: the box of the twin follows.",
         )
-        hidden = moment(is_on_floor, "the box of the twin falls", "The box is hidden: the box of the twin has fallen")
-    write_png(path, beside(seen, hidden))
+        hidden = moment(is_on_floor, "the box of the twin falls", "The box is hidden: the box of the twin has fallen.")
+    write_png(path, beside(seen, hidden, gap_px=16))
+
+
+def shadow(place: Array, number: int) -> Marker:
+    """Returns a disk on the floor below a place [m]."""
+    marker = Marker(ns="shadows", id=number, type=Marker.CYLINDER, frame_locked=True)
+    marker.header.frame_id = "lab/rpbi/world"
+    marker.pose.position, marker.pose.orientation.w = Point(place[0], place[1], 0.0), 1.0
+    marker.scale, marker.color = Vector3(0.16, 0.16, 0.001), ColorRGBA(0.75, 0.8, 0.85, 1.0)
+    return marker
 
 
 def stop_when(stage: Stage, condition: Callable[[], bool]) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import rospy
 from files import write_png
-from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, PoseStamped
 from labels import colour_image, depth_image, inset, label, with_legend
 from nav_msgs.msg import Path as PathMessage
 from PIL import Image
@@ -27,13 +27,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose
-from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import Contacts
 from rpbi_examples.motions import CIRCLE_PERIOD_S, hand_position
-from rpbi_examples.shelving import LEFT, LINK, RIGHT
-from rpbi_planning.msg import MotionRequest
-from rpbi_planning.ros.plan_markers import GHOST_HZ
-from rpbi_planning.srv import PlanAndMove, PlanMotion
 
 ROOT = Path(__file__).resolve().parents[2]
 RVIZ = ROOT / "src/rpbi_examples/rviz"
@@ -43,6 +38,8 @@ ARROW_M_PER_N = 0.04
 """Length of the arrows in the demo, as in its box.yaml [m/N]."""
 FALLEN = rospy.Time(6.0)
 """Time at which all objects lie on the table."""
+NEAR_M = 1.32
+"""Depth up to which the clutter's camera sees the table and no floor [m]."""
 ANGLE = -1.0
 """Angle of the orbiting camera about the vertical [rad]."""
 PUSH_N = 5.2
@@ -105,21 +102,50 @@ def demo(path: Path) -> None:
 
 def clutter_rviz(path: Path) -> None:
     """Objects on a table as a point cloud and markers, and the images of the camera."""
-    view = View((0.0, 0.0, 0.33), 1.08, 0.8, 5.9)
+    view = View((0.0, -0.02, 0.41), 1.0, 0.75, 5.55)
+    cloud = {"Topic": "/pictures/cloud"}
     with Stage(860, 640) as stage:
         stage.launch("clutter.launch", "start:=false")
-        stage.rviz(RVIZ / "clutter.rviz", {"TF": {"Marker Scale": 0.15}}, **view.of_rviz)
+        publisher = rospy.Publisher("/pictures/cloud", PointCloud2, queue_size=1, latch=True)
+        shown = {"TF": {"Marker Scale": 0.3}, "Coloured point cloud": cloud}
+        stage.rviz(RVIZ / "clutter.rviz", shown, **view.of_rviz)
         colour, depth = Latest(COLOUR, ImageMessage), Latest(DEPTH, ImageMessage)
+        points = Latest("rpbi/camera/pointcloud", PointCloud2)
         call("rpbi/start")
         next_message(COLOUR, ImageMessage, lambda each: each.header.stamp > FALLEN)
         stage.stop_world()
+        publisher.publish(near_points(points.message, NEAR_M))
         picture = stage.still_picture()
     whole = Image.new("RGB", (1280, 640), "white")
     whole.paste(picture)
     inset(whole, colour_image(colour.message).resize((412, 316)), "colour image", (866, 2))
-    inset(whole, depth_image(depth.message, 0.5, 1.5).resize((412, 316)), "depth image", (866, 322))
-    label(whole, "RViz: point cloud, markers, frames", (168, 20))
+    inset(
+        whole,
+        depth_image(depth.message, 0.5, NEAR_M).resize((412, 316)),
+        f"depth: 0.5 m is yellow, {NEAR_M:g} m violet",
+        (866, 322),
+    )
+    label(whole, "RViz: point cloud, frames", (124, 20))
     write_png(path, whole, dither=True)
+
+
+def near_points(cloud: PointCloud2, depth_m: float) -> PointCloud2:
+    """Returns the points of a cloud that are nearer to the camera than a depth [m]: the table without the floor."""
+    offset = next(each.offset for each in cloud.fields if each.name == "z")
+    rows = np.frombuffer(cloud.data, np.uint8).reshape(-1, cloud.point_step)
+    depths_m = rows[:, offset : offset + 4].copy().view(np.float32)[:, 0]
+    near = rows[depths_m < depth_m]
+    return PointCloud2(
+        cloud.header,
+        1,
+        len(near),
+        cloud.fields,
+        cloud.is_bigendian,
+        cloud.point_step,
+        near.size,
+        near.tobytes(),
+        cloud.is_dense,
+    )
 
 
 def frustum(info: CameraInfo, depth_m: float) -> Marker:
@@ -237,41 +263,6 @@ def dual_iiwa(path: Path) -> None:
         stage.stop_world()
         picture = stage.still_picture()
     write_png(path, picture)
-
-
-def planning(path: Path) -> None:
-    """A plan from one bookcase into the other: its path, the goal, and the ghost at some places of the path."""
-    view = View((0.25, -0.05, 0.45), 2.1, 0.55, 0.35)
-    ghosts = {"Class": "rviz/MarkerArray", "Marker Topic": "/pictures/ghosts"}
-    with Stage(1280, 720) as stage:
-        stage.launch("planning_example.launch", "move:=false")
-        stage.rviz(RVIZ / "planning_example.rviz", {"Goal": None, "Ghost": None, "Ghosts": ghosts}, **view.of_rviz)
-        publisher = rospy.Publisher("/pictures/ghosts", MarkerArray, queue_size=1, latch=True)
-        rospy.wait_for_service("planner/plan_and_move")
-        move = rospy.ServiceProxy("planner/plan_and_move", PlanAndMove)
-        wait_until(lambda: move(request_to(LEFT.hand_at((0.15, 0.56, 0.27)))).success, "the hand is between the boards")
-        moments: list[MarkerArray] = []
-        rospy.Subscriber("planner/ghost", MarkerArray, moments.append, queue_size=100)
-        plan = rospy.ServiceProxy("planner/plan", PlanMotion)(request_to(RIGHT.hand_at((0.42, -0.56, 0.62))))
-        frames = plan.trajectory.points[-1].time_from_start.to_sec() * GHOST_HZ
-        wait_until(lambda: len(moments) > frames, "the ghost has come to the goal")
-        shown = MarkerArray()
-        for number, share in enumerate((0.25, 0.5, 0.75)):
-            for marker in moments[int(share * frames)].markers:
-                marker.id += 1000 * number
-                shown.markers.append(marker)
-        publisher.publish(shown)
-        stage.stop_world()
-        picture = stage.still_picture()
-    lines = (("#2673d9", "path of the hand, and the ghost of the robot on it"), ("#2e9e52", "goal"))
-    write_png(path, with_legend(picture, lines))
-
-
-def request_to(pose: Pose) -> MotionRequest:
-    """Returns the request for a motion of the hand to a pose in the world."""
-    request = MotionRequest(link=LINK, seed=1)
-    request.pose.pose.position, request.pose.pose.orientation = Point(*pose.position), Quaternion(*pose.quat_xyzw)
-    return request
 
 
 def lfd_rviz(path: Path) -> None:

@@ -55,22 +55,40 @@ SCENES = {
     "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 1.0, 7.0, 3.96, 0.75),
     "factory": View((1.2, 0.3, 1.7), (0.36, 0.02, 0.95), 39.0, 2.0, speed=4.0, still_s=12.0),
     "dual_arm": View((2.2, 1.2, 1.5), (0.33, 0.05, 0.6), 32.0, speed=1.5, still_s=5.0),
-    "shelves": View((-1.3, 1.7, 1.9), (0.42, 0.0, 0.85), 38.0, speed=4.0, still_s=4.0),
+    "shelves": View((-1.3, 1.7, 1.9), (0.42, 0.0, 0.85), 38.0, speed=4.0, still_s=1.7),
 }
 """Views of the scenes."""
 CLUTTER = View((0.60, -0.52, 1.00), (0.0, 0.0, 0.46), 46.0, end_s=2.0, still_s=3.0, speed=0.5)
 ROBOTS = {
-    "kuka_lwr": View((1.6, -1.5, 1.3), (0.35, 0.0, 0.4), 34.0),
-    "dual_iiwa": View((2.0, -1.2, 1.5), (0.2, 0.0, 0.7), 40.0),
-    "panda": View((1.3, -1.2, 1.0), (0.25, 0.0, 0.4), 34.0),
-    "ur5e": View((1.3, -1.1, 1.0), (0.15, 0.0, 0.4), 36.0),
-    "kinova": View((1.1, -1.1, 0.9), (0.0, 0.0, 0.4), 34.0),
-    "talos": View((2.4, -1.6, 1.7), (0.0, 0.0, 0.95), 40.0),
-    "nextage": View((1.7, -1.1, 1.7), (0.0, 0.0, 1.0), 40.0),
-    "mobile_base": View((0.3, -1.9, 1.2), (-0.95, 0.0, 0.3), 38.0),
-    "human_model": View((2.6, -1.6, 1.6), (0.0, 0.0, 0.95), 38.0),
+    "kuka_lwr": View((1.6, -1.5, 1.3), (0.35, 0.0, 0.4), 27.0),
+    "dual_iiwa": View((2.0, -1.2, 1.5), (0.2, 0.0, 0.7), 36.0),
+    "panda": View((1.3, -1.2, 1.0), (0.25, 0.0, 0.4), 31.0),
+    "ur5e": View((1.3, -1.1, 1.0), (0.25, 0.0, 0.28), 27.0),
+    "kinova": View((1.1, -1.1, 0.9), (0.0, 0.0, 0.4), 32.0),
+    "nextage": View((1.7, -1.1, 1.7), (0.0, 0.0, 1.0), 42.0),
+    "mobile_base": View((0.8, -2.3, 1.25), (-0.72, -0.8, 0.4), 32.0),
+    "human_model": View((2.6, -1.6, 1.6), (0.0, 0.0, 0.88), 34.0),
 }
-"""Views of the robots of the basic examples."""
+"""Views of the robots of the basic examples, without Talos, which is in a scene."""
+WORDS = {
+    "kuka_lwr": "KUKA LWR 4+",
+    "dual_iiwa": "two KUKA iiwas",
+    "panda": "Franka Panda",
+    "ur5e": "UR5e",
+    "kinova": "Kinova Jaco with fingers",
+    "nextage": "Nextage",
+    "mobile_base": "mobile base with an arm",
+    "human_model": "model of a person",
+    "cup": "putting a cup on a shelf",
+    "wiping": "wiping a board",
+    "handover": "handing a box to a person",
+    "talos": "Talos, pushed by a rod",
+    "factory": "sorting parts from a belt",
+    "dual_arm": "lifting a box with two arms",
+    "shelves": "reaching past moving blocks",
+    "clutter": "objects for a depth camera",
+}
+"""Captions of the sheet."""
 
 
 class FilmedStage(EnvStage):
@@ -157,6 +175,11 @@ def draw_dual_arm(path: Path) -> None:
     movie("dual_arm", path)
 
 
+def draw_shelves(path: Path) -> None:
+    """Writes the moving picture of the scene `shelves`."""
+    movie("shelves", path)
+
+
 def draw_clutter(path: Path) -> None:
     """Writes the moving picture of the world `clutter`."""
     movie("clutter", path)
@@ -164,10 +187,10 @@ def draw_clutter(path: Path) -> None:
 
 def draw_sheet(path: Path) -> None:
     """Writes the sheet of the robots of the basic examples, and of the scenes at work."""
-    robots = {f"basic_example_{name}": (observed, view) for name, view in ROBOTS.items()}
-    scenes = {name: (filmed, view) for name, view in SCENES.items()} | {"clutter": (observed, CLUTTER)}
+    robots = {name: (f"basic_example_{name}", observed, view) for name, view in ROBOTS.items()}
+    scenes = {name: (name, filmed, view) for name, view in SCENES.items()}
     pictures = [
-        with_caption(film(name, view, SHEET_PX, [view.still_s])[0], name, 16)
-        for name, (film, view) in {**robots, **scenes}.items()
+        with_caption(film(world, view, SHEET_PX, [view.still_s])[0], WORDS[name], 20)
+        for name, (world, film, view) in {**robots, **scenes, "clutter": ("clutter", observed, CLUTTER)}.items()
     ]
-    write_png(path, grid(pictures, COLUMNS))
+    write_png(path, grid(pictures, COLUMNS), dither=True)

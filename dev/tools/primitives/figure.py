@@ -25,18 +25,18 @@ def draw_dmp(axes):
     for x, y in ((0.55, -0.1), (0.6, 0.05), (0.55, 0.25)):
         axes.plot(*primitive.plan(goal=[x, y, 0.0]).positions.T[:2], color=BLUE, lw=1.2)
         axes.plot(x, y, "o", color=BLUE)
-    axes.plot([], [], "o-", color=BLUE, lw=1.2, label="other goals")
+    axes.plot([], [], "o-", color=BLUE, lw=1.2, label="plans to other goals")
     motion, path = primitive.begin(), []
     while not motion.is_at_goal():
         if len(path) == 180:
             motion.set_goal([0.35, -0.1, 0.0])
         path.append(motion.step(0.01).point)
-    axes.plot(*np.array(path).T[:2], color=ORANGE, label="another goal half-way")
+    axes.plot(*np.array(path).T[:2], color=ORANGE, label="plan whose goal is changed half-way")
+    axes.plot(0.35, -0.1, "o", color=ORANGE)
     ball = ObstacleCoupling([0.22, 0.155, 0.0], 0.04)
-    axes.add_patch(plt.Circle(ball.center[:2], ball.radius_m, color=GREY, alpha=0.5))
-    axes.plot(*primitive.plan(couplings=[ball]).positions.T[:2], color=GREEN, label="around an obstacle")
-    axes.set(title="dmp: one demonstration", xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    axes.add_patch(plt.Circle(ball.center[:2], ball.radius_m, color=GREY, alpha=0.5, lw=0, label="obstacle"))
+    axes.plot(*primitive.plan(couplings=[ball]).positions.T[:2], color=GREEN, label="plan around an obstacle")
+    axes.set(title="dmp: learned from one demonstration", xlabel="x [m]", ylabel="y [m]", aspect="equal")
 
 
 def draw_promp(axes):
@@ -52,23 +52,25 @@ def draw_promp(axes):
     via = [ViaPoint(0.5, [0.25, 0.22, 0.0])]
     progress = np.linspace(0.0, 1.0, 101)
     for color, label, distribution in (
-        (BLUE, "all motions, two standard deviations", primitive.distribution),
-        (ORANGE, "those through a via-point", primitive.conditioned(via)),
+        (BLUE, "learned motions: mean and two standard deviations", primitive.distribution),
+        (ORANGE, "the same through a via-point", primitive.conditioned(via)),
     ):
         mean = np.array([primitive.mean_at(distribution, u)[0][1] for u in progress])
         std = primitive.stds(progress, distribution)[:, 1]
-        axes.fill_between(4.0 * progress, mean - 2 * std, mean + 2 * std, color=color, alpha=0.3, lw=0, label=label)
-        axes.plot(4.0 * progress, mean, color=color)
-    axes.plot(2.0, 0.22, "o", color=INK)
-    axes.set(title="promp: six demonstrations", xlabel="time [s]", ylabel="y [m]")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+        axes.fill_between(4.0 * progress, mean - 2 * std, mean + 2 * std, color=color, alpha=0.25, lw=0)
+        axes.plot(4.0 * progress, mean, color=color, label=label)
+    axes.plot(2.0, 0.22, "o", color=INK, zorder=3, label="via-point")
+    axes.set(title="promp: learned from six demonstrations", xlabel="time [s]", ylabel="y [m]")
 
 
 @plot_style()
 def main(path):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5.4), layout="constrained")
     draw_dmp(left)
     draw_promp(right)
+    for axes, x in ((left, 0.05), (right, 0.55)):
+        axes.figure.legend(*axes.get_legend_handles_labels(), loc="upper left", bbox_to_anchor=(x, 0.265))
+    figure.get_layout_engine().set(rect=(0.0, 0.27, 1.0, 0.73), wspace=0.06)
     figure.savefig(path)
 
 

@@ -71,7 +71,7 @@ def _move(planner: actionlib.SimpleActionClient, box: str, step: Step) -> None:
         InterfaceError: If the last attempt fails.
     """
     for seed in range(TRIES):
-        planner.send_goal(MoveRobotGoal(_request(box, step, seed)))
+        planner.send_goal(MoveRobotGoal(motion_request(box, step, seed)))
         planner.wait_for_result()
         result = planner.get_result()
         if result is not None and result.success:
@@ -82,7 +82,8 @@ def _move(planner: actionlib.SimpleActionClient, box: str, step: Step) -> None:
     raise InterfaceError(f"{box}: the hand cannot move to {step.pose}")
 
 
-def _request(box: str, step: Step, seed: int) -> MotionRequest:
+def motion_request(box: str, step: Step, seed: int) -> MotionRequest:
+    """Returns the request for a step that moves the hand; `box` is the box that it holds or grasps."""
     assert step.pose is not None
     request = MotionRequest(robot="panda", link=LINK, seed=seed)
     request.pose = PoseStamped(pose=PoseMessage(Point(*step.pose.position), Quaternion(*step.pose.quat_xyzw)))
