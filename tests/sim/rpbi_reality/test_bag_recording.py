@@ -111,7 +111,9 @@ def test_signals_are_named_after_objects(topic, signal):
 
 
 def test_a_signal_that_the_bag_lacks_is_named(bag):
-    with pytest.raises(ConfigError, match="expected a topic of this signal; the bag has arm, arm/target, box") as refused:
+    with pytest.raises(
+        ConfigError, match="expected a topic of this signal; the bag has arm, arm/target, box"
+    ) as refused:
         read_recordings(bag, _fit("bax"))
     assert "run.bag" in str(refused.value) and "bax" in str(refused.value)
 

@@ -15,8 +15,22 @@ from rpbi_reality.pushes.convert_pushes import RECORDINGS, SIMULATIONS, STEMS, U
 from rpbi_reality.pushes.marker_calibration import ArmKinematics
 from rpbi_reality.pushes.motion_capture import Body, read_recording
 
-LENGTHS = [(0.0, 0.0, 0.15), (0.0, 0.0, 0.12), (0.0, -0.29, 0.0), (0.0, 0.12, -0.01), (0.0, 0.0, -0.08), (0.0, 0.0, -0.08)]
-TURNS = [(0.0, 3.1416, 0.0), (-1.5708, 0.0, 3.1416), (0.0, 3.1416, 0.0), (-1.5708, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+LENGTHS = [
+    (0.0, 0.0, 0.15),
+    (0.0, 0.0, 0.12),
+    (0.0, -0.29, 0.0),
+    (0.0, 0.12, -0.01),
+    (0.0, 0.0, -0.08),
+    (0.0, 0.0, -0.08),
+]
+TURNS = [
+    (0.0, 3.1416, 0.0),
+    (-1.5708, 0.0, 3.1416),
+    (0.0, 3.1416, 0.0),
+    (-1.5708, 0.0, 0.0),
+    (1.0, 0.0, 0.0),
+    (1.0, 0.0, 0.0),
+]
 BASE = Body(np.array([[0.004, -0.003, 0.0505]]), Rotation.from_euler("xyz", [0.2, -0.3, 2.0], degrees=True))
 MARKERS = Body(np.array([[0.003, 0.0, -0.004]]), Rotation.from_euler("xyz", [0.5, -0.3, 0.4], degrees=True))
 """Not far from what the fit expects, since the data do not tell all of it."""

@@ -30,7 +30,13 @@ FURTHER = {
     "offset_z": {"set": "measured.box.offset[2]", "bounds": [-0.02, 0.02]},
 }
 """Five further parameters."""
-FURTHER_VALUES = {"puck_friction": 0.12, "tracker_delay": 0.013, "offset_x": 0.004, "offset_y": -0.006, "offset_z": 0.002}
+FURTHER_VALUES = {
+    "puck_friction": 0.12,
+    "tracker_delay": 0.013,
+    "offset_x": 0.004,
+    "offset_y": -0.006,
+    "offset_z": 0.002,
+}
 
 
 def known_fit(further: bool = False) -> FitConfig:
@@ -56,5 +62,13 @@ def write_known_motion(path: Path, config: FitConfig, values: dict[str, float], 
     """Writes 60 s of motion at 100 Hz with noise of 1 mm and 1 mrad."""
     joints = ("shoulder",)
     write_motion(
-        path, WORLD, config, values, {"arm/target": joints}, joints={"arm": joints}, runs=RUNS, duration_s=3.0, seed=seed
+        path,
+        WORLD,
+        config,
+        values,
+        {"arm/target": joints},
+        joints={"arm": joints},
+        runs=RUNS,
+        duration_s=3.0,
+        seed=seed,
     )

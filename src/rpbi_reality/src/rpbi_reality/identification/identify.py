@@ -22,7 +22,6 @@ from .evaluator import Evaluation, Evaluator
 from .fit_config import FitConfig
 from .pictures import parameter_picture
 from .recording_files import read_recordings
-from .recordings import MeasuredRun
 from .search import ParameterSpace, search
 from .uncertainty import Uncertainty, uncertainty
 
