@@ -285,8 +285,7 @@ def _simulated_poses(table: np.ndarray, engine: str, arm: ArmKinematics) -> Push
 
 def _write(target: Path, parts: dict[str, list[np.ndarray]], columns: dict[str, np.ndarray]) -> None:
     offset = np.cumsum([0, *map(len, parts["time"])]).astype(np.int32)
+    arrays = {key: np.concatenate(each) for key, each in parts.items()}
     target.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(target) as part, part.open("wb") as stream:
-        np.savez_compressed(
-            stream, **{key: np.concatenate(each) for key, each in parts.items()}, **columns, offset=offset
-        )
+        np.savez_compressed(stream, **arrays, **columns, offset=offset)
