@@ -105,11 +105,15 @@ def _gauss_newton(
         prior = matrix.T @ matrix
     full = squares.sum(0) + prior
     ridge = RIDGE * np.eye(count) * np.trace(full) / count * 1e-6
-    shifts = []
-    for _ in range(ROUNDS):
-        chosen = random.integers(0, len(blocks), len(blocks))
-        shifts.append(-np.linalg.solve(squares[chosen].sum(0) + prior + ridge, gradients[chosen].sum(0)))
-    return np.array(shifts), full, len(blocks)
+    often = _resamples(len(blocks), random)
+    slopes = (often @ gradients)[:, :, None]
+    shifts = -np.linalg.solve(np.einsum("rb,bij->rij", often, squares) + prior + ridge, slopes)[:, :, 0]
+    return shifts, full, len(blocks)
+
+
+def _resamples(count: int, random: np.random.Generator) -> np.ndarray:
+    """Returns how often each run is in each resample, shape (rounds, count)."""
+    return random.multinomial(count, np.full(count, 1.0 / count), ROUNDS).astype(float)
 
 
 def _quadratic(points: np.ndarray) -> np.ndarray:
@@ -143,7 +147,7 @@ def _surrogate(found: Found, random: np.random.Generator) -> tuple[np.ndarray, n
 
     _, hessian = minimum(capped.mean(1))
     runs = capped.shape[1]
-    steps = np.array([minimum(capped[:, random.integers(0, runs, runs)].mean(1))[0] for _ in range(ROUNDS)])
+    steps = np.array([minimum(means)[0] for means in _resamples(runs, random) @ capped.T / runs])
     return steps * scale, hessian / np.outer(scale, scale) / 2.0, runs
 
 
