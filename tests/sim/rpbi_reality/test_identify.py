@@ -5,9 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import genpy
 import numpy as np
 import pytest
+import rosbag
 import yaml
+from geometry_msgs.msg import Point, Quaternion
+from nav_msgs.msg import Odometry
 from real_contacts import toss_arrays, write
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
@@ -205,6 +209,21 @@ def test_tables_are_read_from_csv(world, tmp_path, motion):
     (tmp_path / "motion.csv").write_text(text)
     result = identify_world(world, tmp_path / "motion.csv", fit(runs={"count": 1}), 1)
     assert result.values["friction"] == pytest.approx(0.35, rel=0.05)
+
+
+def test_a_bag_leads_to_the_same_values_as_a_table(world, tmp_path, motion):
+    with rosbag.Bag(str(tmp_path / "motion.bag"), "w") as bag:
+        arrays = dict(np.load(motion))
+        for time_s, pose in zip((1.7e9 + arrays["time"][:60]).tolist(), arrays["box/pose"][:60].tolist()):
+            message = Odometry()
+            message.header.stamp = genpy.Time.from_sec(time_s)
+            message.pose.pose.position = Point(*pose[:3])
+            message.pose.pose.orientation = Quaternion(*pose[3:])
+            bag.write("/rpbi/box/base_state", message, message.header.stamp)
+    write(tmp_path / "first.npz", {key: arrays[key][:60] for key in ("time", "box/pose")})
+    each = [identify_world(world, tmp_path / name, fit(runs={"count": 1}), 1) for name in ("motion.bag", "first.npz")]
+    assert each[0].values == pytest.approx(each[1].values, rel=1e-3)
+    assert each[0].values["friction"] == pytest.approx(0.35, rel=0.05)
 
 
 def test_tosses_start_with_the_measured_state(tmp_path):

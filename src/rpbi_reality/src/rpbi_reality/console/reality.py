@@ -11,6 +11,7 @@ from custom_ros_tools.errors import InterfaceError
 from rpbi_reality.evaluation import PushResult, TossResult, evaluate_pushes, evaluate_tosses, find_file, find_urdf
 from rpbi_reality.page import write_page
 from rpbi_reality.pictures import write_pictures
+from rpbi_reality.pushes.convert_pushes import RECORDINGS, convert_pushes
 from rpbi_reality.report import push_table, toss_table, write_json
 from rpbi_reality.tosses.convert_tosses import convert_tosses
 
@@ -38,12 +39,16 @@ def reality(
         out: folder for pictures and page; default out/reality
         json: file for the tables; default FOLDER/reality.json
         no_pictures: writes neither pictures nor page
-        convert: a clone of the repository with the published tosses; writes cube_tosses.npz to the folder of the data,
-            and ends
+        convert: a clone of the repository with the published tosses or pushes; writes cube_tosses.npz, or
+            arm_pushes.npz and arm_pushes_simulators.npz, to the folder of the data, and ends
     """
     if convert is not None:
-        count = convert_tosses(convert, data / "cube_tosses.npz")
-        print(f"{data / 'cube_tosses.npz'}: {count} tosses")
+        if (convert / RECORDINGS).is_dir():
+            for path, count in convert_pushes(convert, data).items():
+                print(f"{path}: {count} runs")
+        else:
+            count = convert_tosses(convert, data / "cube_tosses.npz")
+            print(f"{data / 'cube_tosses.npz'}: {count} tosses")
         return 0
     if not data.is_dir():
         raise UsageError(f"--data: there is no folder {data}; docs/reality.md says what to download")

@@ -6,7 +6,7 @@ import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -34,6 +34,15 @@ class Evaluation(NamedTuple):
     runs: np.ndarray
     residuals: list[np.ndarray]
     problems: tuple[str, ...] = ()
+
+
+class Evaluates(Protocol):
+    """Evaluates candidates, in any simulator; see `Evaluator` for the members."""
+
+    count: int
+    problems: dict[str, int]
+
+    def __call__(self, candidates: Sequence[Mapping[str, float]], runs: Sequence[int]) -> list[Evaluation]: ...
 
 
 class _Job(NamedTuple):

@@ -22,7 +22,6 @@ from .evaluator import Evaluation, Evaluator
 from .fit_config import FitConfig
 from .pictures import parameter_picture
 from .recording_files import read_recordings
-from .recordings import MeasuredRun
 from .search import ParameterSpace, search
 from .uncertainty import Uncertainty, uncertainty
 
@@ -64,25 +63,24 @@ def read_fit(path: Path) -> FitConfig:
     return FitConfig.parse(load_config(str(path)), str(path))
 
 
-def chosen_runs(config: FitConfig, runs: list[MeasuredRun], file: str) -> tuple[list[int], list[int]]:
+def chosen_runs(config: FitConfig, names: list[str], file: str) -> tuple[list[int], list[int]]:
     """Returns the indices of the runs from which parameters are identified, and of the held-out runs.
 
     Raises:
         ConfigError: If a named run is missing, or there are fewer runs than `count`.
     """
-    names = [run.name for run in runs]
     if config.runs.names:
         if missing := [name for name in config.runs.names if name not in names]:
             raise ConfigError([Problem(file, "runs.names", f"there is no run {', '.join(missing)}")])
         trained = [index for index, name in enumerate(names) if name in config.runs.names]
     else:
-        count = config.runs.count or max(1, math.ceil(0.75 * len(runs)))
-        if count > len(runs):
+        count = config.runs.count or max(1, math.ceil(0.75 * len(names)))
+        if count > len(names):
             raise ConfigError(
-                [Problem(file, "runs.count", f"expected at most {len(runs)}, the number of runs; got {count}")]
+                [Problem(file, "runs.count", f"expected at most {len(names)}, the number of runs; got {count}")]
             )
-        trained = sorted(np.random.default_rng(config.runs.seed).permutation(len(runs))[:count].tolist())
-    return trained, [index for index in range(len(runs)) if index not in set(trained)]
+        trained = sorted(np.random.default_rng(config.runs.seed).permutation(len(names))[:count].tolist())
+    return trained, [index for index in range(len(names)) if index not in set(trained)]
 
 
 def identify_world(
@@ -109,7 +107,7 @@ def identify_world(
         MissingDependency: If the search needs a library that is not installed.
     """
     runs = read_recordings(data, config)
-    trained, held_out = chosen_runs(config, runs, str(data))
+    trained, held_out = chosen_runs(config, [run.name for run in runs], str(data))
     evaluator = Evaluator(world, config, runs, urdf, jobs)
     space = ParameterSpace(config.parameters)
     first = {name: each.first for name, each in config.parameters.items()}

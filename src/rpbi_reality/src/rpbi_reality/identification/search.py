@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from custom_ros_tools.errors import InterfaceError, MissingDependency
 
-from .evaluator import Evaluator
+from .evaluator import Evaluates
 from .fit_config import FitConfig, ParameterConfig
 
 DIFFERENCE = 0.01
@@ -82,7 +82,7 @@ class Found(NamedTuple):
 
 
 def search(
-    config: FitConfig, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None] = lambda _: None
+    config: FitConfig, evaluate: Evaluates, runs: Sequence[int], report: Callable[[str], None] = lambda _: None
 ) -> Found:
     """Searches for the parameters with the smallest errors.
 
@@ -101,7 +101,7 @@ def search(
     return (_cmaes if config.method == "cmaes" else _least_squares)(config, space, evaluate, runs, report)
 
 
-def _refuse_without_effect(config: FitConfig, space: ParameterSpace, evaluate: Evaluator, runs: Sequence[int]) -> None:
+def _refuse_without_effect(config: FitConfig, space: ParameterSpace, evaluate: Evaluates, runs: Sequence[int]) -> None:
     """Raises an error that names parameters on which the errors do not depend."""
     first, few = np.clip(space.first, 0.02, 0.98), runs[: min(len(runs), 10)]
     shifted = [first + 0.25 * np.eye(len(first))[i] * (1.0 if first[i] < 0.6 else -1.0) for i in range(len(first))]
@@ -114,7 +114,7 @@ def _refuse_without_effect(config: FitConfig, space: ParameterSpace, evaluate: E
 
 
 def _least_squares(
-    config: FitConfig, space: ParameterSpace, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
+    config: FitConfig, space: ParameterSpace, evaluate: Evaluates, runs: Sequence[int], report: Callable[[str], None]
 ) -> Found:
     """Trust region reflective (Branch, Coleman and Li 1999) with the loss soft L1 over all residuals."""
     count = len(space.names)
@@ -161,7 +161,7 @@ def _least_squares(
 
 
 def _cmaes(
-    config: FitConfig, space: ParameterSpace, evaluate: Evaluator, runs: Sequence[int], report: Callable[[str], None]
+    config: FitConfig, space: ParameterSpace, evaluate: Evaluates, runs: Sequence[int], report: Callable[[str], None]
 ) -> Found:
     """Covariance matrix adaptation evolution strategy (Hansen 2016), of the library `cmaes`."""
     try:

@@ -28,6 +28,9 @@ class MujocoSettings(NamedTuple):
         mass: Mass [kg].
         inertia: Moment of inertia about each axis [kg m^2].
         centre: Centre of mass [m] in the cube's frame.
+        impedance: Impedance of contacts without penetration, the first number of `solimp`.
+        width: Penetration [m] at which the impedance reaches 0.95, the third number of `solimp`.
+        table_height: Height of the table [m].
     """
 
     side: float = 0.1048
@@ -38,6 +41,9 @@ class MujocoSettings(NamedTuple):
     mass: float = 0.37
     inertia: tuple[float, float, float] = (0.00081, 0.00081, 0.00081)
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    impedance: float = 0.9
+    width: float = 0.001
+    table_height: float = 0.0
 
 
 PUBLISHED = MujocoSettings()
@@ -72,14 +78,15 @@ class MujocoCube:
 
     def __init__(self, settings: MujocoSettings, frame_rate: float, ticks: int = 7) -> None:
         half, contact = settings.side / 2.0, f'friction="{settings.friction} 0 0" condim="3"'
-        contact += f' solref="{settings.time_constant} {settings.damping_ratio}" solimp="0.9 0.95 0.001 0.5 2"'
+        contact += f' solref="{settings.time_constant} {settings.damping_ratio}"'
+        contact += f' solimp="{settings.impedance} 0.95 {settings.width} 0.5 2"'
         self._ticks = ticks
         self._model = mujoco.MjModel.from_xml_string(
             f"""<mujoco>
             <option timestep="{1.0 / frame_rate / ticks}" gravity="0 0 {-settings.gravity}"
               cone="elliptic" impratio="10"/>
             <worldbody>
-              <geom type="plane" size="5 5 0.1" {contact}/>
+              <geom type="plane" pos="0 0 {settings.table_height}" size="5 5 0.1" {contact}/>
               <body>
                 <freejoint/>
                 <inertial pos="{_words(settings.centre)}" mass="{settings.mass}"
