@@ -13,7 +13,7 @@ from .scene import PlanningScene
 from .scene_robot import SceneRobot
 from .timing import PathTiming, PlannedTrajectory
 
-PERIOD_S = 0.02
+PERIOD_S = 0.01
 """Time between two commands that are checked [s]."""
 MARGIN_M = 1e-3
 """Margin of the guard's distances to bodies [m], for braking that begins between two commands that are checked."""
