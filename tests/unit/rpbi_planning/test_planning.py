@@ -195,7 +195,7 @@ def test_held_body_is_kept_off_obstacles(scene):
 
 
 def test_certified_plan_passes_the_guard(scene):
-    from rpbi_planning.certify import guard_of
+    from rpbi_planning.certify import PERIOD_S, guard_of
     from safe_robot.check import CheckContext
 
     result = plan(scene, "arm", JointGoal(GOAL), shorten_s=0.1, time_limit_s=60.0)
@@ -203,7 +203,7 @@ def test_certified_plan_passes_the_guard(scene):
     guard, context = guard_of(scene, scene.robots["arm"]), CheckContext(obstacles=scene.obstacles_for("arm"))
     guard.start()
     assert result.trajectory is not None
-    assert not [q for q in result.trajectory.sampled(0.02) if guard.decide(tuple(q), context).violation]
+    assert not [q for q in result.trajectory.sampled(PERIOD_S) if guard.decide(tuple(q), context).violation]
     guard = guard_of(scene, scene.robots["arm"])
     guard.start()
     assert [q for q in straight(100) if guard.decide(tuple(q), context).violation]  # the straight motion is refused
