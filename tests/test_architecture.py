@@ -55,7 +55,7 @@ ALLOWED = {
 """What each package may depend on."""
 FORMER_NODES = {"ik_ros": {"operator_node"}}
 """Packages whose nodes some others run under names that they had there; nothing else there imports them."""
-MIDDLEWARE = re.compile(r"^(rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|\w+_msgs|\w+_srvs)$")
+MIDDLEWARE = re.compile(r"^(actionlib|rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|\w+_msgs|\w+_srvs)$")
 MESSAGES_OF_OURS = re.compile(r"^(ros_pybullet_interface|\w+\.(srv|msg))(\.|$)")
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 GENERATED = re.compile(r"^\w+\.(msg|srv|action)\b")
 """Messages and services, which are not in the source tree."""
 OF_ROS = re.compile(
-    r"(rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|ros_pybullet_interface|\w+_msgs|\w+_srvs|\w+\.(msg|srv))\b"
+    r"(actionlib|rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|ros_pybullet_interface|\w+_msgs|\w+_srvs|\w+\.(msg|srv))\b"
 )
 """Imports that need ROS."""
 TABLE_ENTRY = re.compile(r'"((?!\w+\.ros\.)[a-z_][\w.]*):[A-Za-z_]\w*"')

@@ -19,6 +19,7 @@ from control_msgs.msg import (
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.action_client import ActionClient
 
 SERVER_S = 5.0
 """Longest time to wait for the robot's action, in wall time [s]."""
@@ -59,7 +60,7 @@ class RequestedMotion:
         """
         wanted = goal_of(**goal)
         name = rospy.resolve_name(f"rpbi/{robot}/joint_trajectory_controller/follow_joint_trajectory")
-        client = actionlib.SimpleActionClient(name, FollowJointTrajectoryAction)
+        client = ActionClient(name, FollowJointTrajectoryAction)
         if not client.wait_for_server(rospy.Duration.from_sec(SERVER_S)):
             raise InterfaceError(f"no action {name} answers")
         client.send_goal(wanted, done_cb=self._on_done, feedback_cb=self._on_action_feedback)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from itertools import count
 
-import actionlib
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.action_client import ActionClient
 from custom_ros_tools.ros.lifecycle.end_launch import end_launch
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
@@ -37,7 +37,7 @@ def planning_example() -> None:
 def _carry_boxes() -> None:
     tf = TfInterface()
     fingers = rospy.Publisher("rpbi/panda/joint_states/target", JointState, queue_size=10, latch=True)
-    planner = actionlib.SimpleActionClient("planner/move_robot", MoveRobotAction)
+    planner = ActionClient("planner/move_robot", MoveRobotAction)
     planner.wait_for_server()
     wait_until_ready()
     rounds = int(rospy.get_param("~rounds", 0))
@@ -64,7 +64,7 @@ def _place(tf: TfInterface, box: str) -> Vector:
     return x, y, z
 
 
-def _move(planner: actionlib.SimpleActionClient, box: str, step: Step) -> None:
+def _move(planner: ActionClient, box: str, step: Step) -> None:
     """Moves the hand, and tries again if there is no path.
 
     Raises:

@@ -12,6 +12,7 @@ import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.action_client import ActionClient
 from rpbi_planning.braking import SampledMotion, braked
 
 from .motion_messages import trajectory_message
@@ -38,7 +39,7 @@ class TrajectoryClient:
     def __init__(self, action: str, joint_names: Sequence[str], acceleration: float) -> None:
         self._name = rospy.resolve_name(action)
         self._joint_names, self._acceleration = tuple(joint_names), acceleration
-        self._client = actionlib.SimpleActionClient(self._name, FollowJointTrajectoryAction)
+        self._client = ActionClient(self._name, FollowJointTrajectoryAction)
         self._ended = threading.Event()
         self._trajectory: SampledMotion | None = None
         self._begin = rospy.Time()
