@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 import yaml
-from page_blocks import ROOT, blocks_in
+from page_blocks import ROOT
 
 EXAMPLES = "src/rpbi_examples"
 NUMBERS = "zero one two three four five six seven eight nine ten eleven twelve".split()
@@ -40,11 +40,6 @@ def rows(page: str, heading: str) -> int:
     """Returns the number of rows of the first table below a heading."""
     table = re.search(r"(?:^\|.*\n)+", (ROOT / page).read_text().split(f"\n{heading}\n")[1], re.MULTILINE)
     return table[0].count("\n") - 2 if table else 0
-
-
-def commands_after(page: str, text: str) -> int:
-    """Returns the number of commands in the first block after a text."""
-    return len(blocks_in((ROOT / page).read_text().split(text)[1], page)[0].commands)
 
 
 class Count(NamedTuple):
@@ -82,7 +77,6 @@ COUNTS = [
     Count(
         "docs/architecture.md", r"## (\w+) ways of data", lambda: rows("docs/architecture.md", "## Five ways of data")
     ),
-    Count("README.md", r"(\w+) more commands; ", lambda: commands_after("README.md", "more commands; ")),
 ]
 
 
