@@ -154,7 +154,7 @@ def avatar_walking(path: Path) -> None:
             right, left = (world.wait_for(f"rpbi/human/{side}UpperArm") for side in ("Right", "Left"))
             x, y, _ = right - left
             to_camera = CAMERA_YAW_RAD - np.arctan2(y, x)  # the front is at +90 degrees of the right side
-            return bool(abs((to_camera - BESIDE_RAD + np.pi) % (2.0 * np.pi) - np.pi) < 0.25)
+            return bool(abs((to_camera - BESIDE_RAD + np.pi) % (2.0 * np.pi) - np.pi) < 0.4)
 
         def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
             stop_when(stage, lambda: is_seen_from_ahead() and condition())
