@@ -164,7 +164,7 @@ def avatar_walking(path: Path) -> None:
 
         pictures = (
             moment(lambda: part("RightFoot")[0] - part("LeftFoot")[0] > 0.4, "The avatar walks."),
-            moment(lambda: part("RightHand")[0] > 0.45, "Its right hand reaches forward."),
+            moment(lambda: bool((part("RightHand") > (0.45, -9.0, 0.2)).all()), "Its right hand reaches forward."),
         )
     write_png(path, beside(*pictures))
 
