@@ -18,10 +18,13 @@ from rpbi_data.labels.bop import SCENE
 from rpbi_data.labels.dataset import write_labelled_images
 
 WORLD = "{rpbi_examples}/configs/clutter/config.yaml"
-SEED = 7
+SEED = 0
+"""Seed of an image that shows all 25 objects."""
 FINE = 2
 """Rows and columns of the image for each of the picture."""
-WIDTH, HEIGHT = 1120, 840
+WIDTH, HEIGHT = 1260, 945
+MARGIN = 40 * FINE
+"""Width of the margin around all objects, in pixels of the image."""
 AXIS_M = 0.05
 """Length of the axes of a pose [m]."""
 AXES = ("#e02020", "#18a018", "#2050f0")
@@ -49,20 +52,25 @@ def _drawn(folder: Path) -> Image.Image:
     scene = folder / SCENE
     coco = json.loads((scene / "scene_gt_coco.json").read_text())
     names = {each["id"]: each["name"] for each in coco["categories"]}
+    labels = coco["annotations"]
     picture = Image.open(scene / "rgb/000000.png").convert("RGB")
-    for index in range(len(coco["annotations"])):
+    for index in range(len(labels)):
         mask = Image.open(scene / f"mask_visib/000000_{index:06d}.png").convert("L").point(lambda value: 0.35 * value)
         picture.paste(COLOURS[index % len(COLOURS)], mask=mask)
     draw = ImageDraw.Draw(picture)
     K = np.reshape(json.loads((scene / "scene_camera.json").read_text())["0"]["cam_K"], (3, 3))
     poses = json.loads((scene / "scene_gt.json").read_text())["0"]
-    for index, (label, pose) in enumerate(zip(coco["annotations"], poses)):
+    for index, (label, pose) in enumerate(zip(labels, poses)):
         x, y, width, height = label["bbox"]
         draw.rectangle((x, y, x + width, y + height), outline=COLOURS[index % len(COLOURS)], width=2 * FINE)
         _draw_axes(draw, K, pose)
-    for index, label in enumerate(coco["annotations"]):
+    for index, label in enumerate(labels):
         _write_name(draw, label["bbox"], names[label["category_id"]], COLOURS[index % len(COLOURS)])
-    return picture.reduce(FINE)
+    edges = np.array([(x, y, x + width, y + height) for x, y, width, height in (each["bbox"] for each in labels)])
+    left, top = edges[:, :2].min(axis=0) - MARGIN
+    right, bottom = edges[:, 2:].max(axis=0) + MARGIN
+    width, height = picture.size
+    return picture.crop((max(left, 0), max(top, 0), min(right, width), min(bottom, height))).reduce(FINE)
 
 
 def _draw_axes(draw: ImageDraw.ImageDraw, K: np.ndarray, pose: dict[str, Any]) -> None:

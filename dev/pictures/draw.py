@@ -84,6 +84,8 @@ PICTURES: dict[str, str] = {
     "robot_model.png": "guides:draw_robot_model",
     "python.png": "guides:draw_python",
     "browser_demo.png": "live_page:draw_browser_demo",
+    "browser_factory.png": "live_page:draw_browser_factory",
+    "browser_talos.png": "live_page:draw_browser_talos",
     "controls.png": "windows:controls",
     "devices.png": "windows:devices",
     "live_plot.png": "windows:live_plot",

@@ -20,7 +20,7 @@ from files import write_png
 from labels import label
 from PIL import Image
 from render import beside
-from screen import Stage, next_message, wait_until
+from screen import PATIENCE_S, Stage, next_message, wait_until
 
 from ros_pybullet_interface.msg import Contacts, SimulationState
 
@@ -35,8 +35,8 @@ IMAGE = "rpbi/camera/colour/image/compressed"
 CAMERA = "initialCameraPosition=0.75,-1.65,1.1&initialCameraLookAt=0.53,0.0,0.27"
 """Position of the page's camera, and point that it looks at [m]: the arm is to the left of the panel."""
 CLOSE = "[...document.querySelectorAll('[class*=Notification-closeButton]')].map((each) => each.click()).length"
-DRAWN_S = 5.0
-"""Time in which the page has drawn the stopped world [s]."""
+LOOKS, LOOKS_S = 3, 2.0
+"""Number of equal pictures after which the page has drawn the stopped world, and time between two of them [s]."""
 
 
 HALF = (600, 520)
@@ -66,8 +66,7 @@ def draw_browser(path: Path) -> None:
         _close_warning(tab)
         next_message("rpbi/box/contacts", Contacts, lambda each: push_n(each) > PUSH_N)
         stage.stop_world()
-        time.sleep(DRAWN_S)
-        write_png(path, _screenshot(tab, Path(folder)))
+        write_png(path, _still_screenshot(tab, Path(folder)))
 
 
 def draw_browser_demo(path: Path) -> None:
@@ -120,9 +119,8 @@ def _draw_beside(
         tab.open(f"{_start_view(stage, Path(folder))}?{camera}")
         tab.wait("document.body.innerText.includes('Time line')", 300.0)
         _close_warning(tab)
-        time.sleep(DRAWN_S)
         left = (PAGE_WIDTH - HALF[0]) // 2
-        page = _screenshot(tab, Path(folder)).crop((left, 0, left + HALF[0], HALF[1]))
+        page = _still_screenshot(tab, Path(folder)).crop((left, 0, left + HALF[0], HALF[1]))
     label(rviz, "RViz", (60, 24))
     label(page, "browser", (60, 24))
     write_png(path, beside(rviz, page))
@@ -152,9 +150,18 @@ def _start_view(stage: Stage, folder: Path) -> str:
     return str(wait_until(lambda: re.search(r"view: (\S+)", log.read_text()), "the view runs")[1])
 
 
-def _screenshot(tab: Tab, folder: Path) -> Image.Image:
-    """Returns a picture of the page."""
-    tab.screenshot(folder / "page.png")
+def _still_screenshot(tab: Tab, folder: Path) -> Image.Image:
+    """Returns a picture of the connected page as soon as it stays the same."""
+    tab.wait("document.body.innerText.includes('Connected')", PATIENCE_S)
+    pictures: list[bytes] = []
+
+    def is_still() -> bool:
+        time.sleep(LOOKS_S)
+        tab.screenshot(folder / "page.png")
+        pictures.append((folder / "page.png").read_bytes())
+        return len(pictures) > LOOKS and len(set(pictures[-LOOKS:])) == 1
+
+    wait_until(is_still, "the page stands still")
     return Image.open(folder / "page.png").convert("RGB")
 
 

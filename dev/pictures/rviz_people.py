@@ -33,7 +33,7 @@ RESTS_S = 3.0
 """Time after which the arm rests on the box, and after which RViz shows all segments of people [s]."""
 ORIGINS = {"laboratory": np.zeros(3), "twin": np.array((0.0, 1.2, -0.01))}
 """Origins of both worlds in that of the laboratory, for RViz [m]."""
-CAMERA_YAW_RAD, BESIDE_RAD = -0.8, 0.75
+CAMERA_YAW_RAD, BESIDE_RAD = -0.8, 0.5
 """Direction of the camera as seen from the avatar, and its angle to the direction of the avatar's right side [rad]."""
 SEGMENTS = {"Head": (-110, 34), "RightHand": (10, 60), "Pelvis": (-90, 20), "LeftFoot": (80, -10)}
 """Segments whose frames have labels, and the offsets of these labels [px]."""
@@ -154,7 +154,7 @@ def avatar_walking(path: Path) -> None:
             right, left = (world.wait_for(f"rpbi/human/{side}UpperArm") for side in ("Right", "Left"))
             x, y, _ = right - left
             to_camera = CAMERA_YAW_RAD - np.arctan2(y, x)  # the front is at +90 degrees of the right side
-            return bool(abs((to_camera - BESIDE_RAD + np.pi) % (2.0 * np.pi) - np.pi) < 0.25)
+            return bool(abs((to_camera - BESIDE_RAD + np.pi) % (2.0 * np.pi) - np.pi) < 0.3)
 
         def moment(condition: Callable[[], bool], meaning: str) -> Image.Image:
             stop_when(stage, lambda: is_seen_from_ahead() and condition())
@@ -164,7 +164,7 @@ def avatar_walking(path: Path) -> None:
 
         pictures = (
             moment(lambda: part("RightFoot")[0] - part("LeftFoot")[0] > 0.4, "The avatar walks."),
-            moment(lambda: part("RightHand")[0] > 0.45, "Its right hand reaches forward."),
+            moment(lambda: bool((part("RightHand") > (0.45, -9.0, 0.2)).all()), "Its right hand reaches forward."),
         )
     write_png(path, beside(*pictures))
 

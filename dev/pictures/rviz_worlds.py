@@ -38,8 +38,8 @@ ARROW_M_PER_N = 0.04
 """Length of the arrows in the demo, as in its box.yaml [m/N]."""
 FALLEN = rospy.Time(6.0)
 """Time at which all objects lie on the table."""
-NEAR_M = 1.32
-"""Depth up to which the clutter's camera sees the table and no floor [m]."""
+FLOOR_M, FAR_M = 0.05, 1.5
+"""Height up to which points belong to the floor, and largest depth in the picture of the depth image [m]."""
 ANGLE = -1.0
 """Angle of the orbiting camera about the vertical [rad]."""
 PUSH_N = 5.2
@@ -111,30 +111,32 @@ def clutter_rviz(path: Path) -> None:
         stage.rviz(RVIZ / "clutter.rviz", shown, **view.of_rviz)
         colour, depth = Latest(COLOUR, ImageMessage), Latest(DEPTH, ImageMessage)
         points = Latest("rpbi/camera/pointcloud", PointCloud2)
+        tf = TfInterface()
         call("rpbi/start")
         next_message(COLOUR, ImageMessage, lambda each: each.header.stamp > FALLEN)
+        camera = TfInterface.msg_to_matrix(tf.wait_for_tf_msg(WORLD, points.message.header.frame_id))
         stage.stop_world()
-        publisher.publish(near_points(points.message, NEAR_M))
+        publisher.publish(points_above(points.message, camera, FLOOR_M))
         picture = stage.still_picture()
     whole = Image.new("RGB", (1280, 640), "white")
     whole.paste(picture)
     inset(whole, colour_image(colour.message).resize((412, 316)), "colour image", (866, 2))
     inset(
         whole,
-        depth_image(depth.message, 0.5, NEAR_M).resize((412, 316)),
-        f"depth: 0.5 m is yellow, {NEAR_M:g} m violet",
+        depth_image(depth.message, 0.5, FAR_M).resize((412, 316)),
+        f"depth: 0.5 m is yellow, {FAR_M:g} m violet",
         (866, 322),
     )
     label(whole, "RViz: point cloud, frames", (124, 20))
     write_png(path, whole, dither=True)
 
 
-def near_points(cloud: PointCloud2, depth_m: float) -> PointCloud2:
-    """Returns the points of a cloud that are nearer to the camera than a depth [m]: the table without the floor."""
-    offset = next(each.offset for each in cloud.fields if each.name == "z")
+def points_above(cloud: PointCloud2, camera: Any, height_m: float) -> PointCloud2:
+    """Returns the points of a cloud that are above a height in the world [m]; `camera` is the pose of its frame."""
     rows = np.frombuffer(cloud.data, np.uint8).reshape(-1, cloud.point_step)
-    depths_m = rows[:, offset : offset + 4].copy().view(np.float32)[:, 0]
-    near = rows[depths_m < depth_m]
+    begin = next(each.offset for each in cloud.fields if each.name == "x")
+    places = rows[:, begin : begin + 12].copy().view(np.float32)
+    near = rows[places @ camera[2, :3] + camera[2, 3] > height_m]
     return PointCloud2(
         cloud.header,
         1,
