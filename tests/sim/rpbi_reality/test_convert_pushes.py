@@ -13,7 +13,7 @@ from rpbi_reality.console.reality import reality
 from rpbi_reality.pose_errors import angle_deg
 from rpbi_reality.pushes.convert_pushes import RECORDINGS, SIMULATIONS, STEMS, URDF, convert_pushes, schedule
 from rpbi_reality.pushes.marker_calibration import ArmKinematics
-from rpbi_reality.pushes.motion_capture import Body, read_recording
+from rpbi_reality.pushes.motion_capture import MarkerPoses, read_recording
 
 LENGTHS = [
     (0.0, 0.0, 0.15),
@@ -31,10 +31,10 @@ TURNS = [
     (1.0, 0.0, 0.0),
     (1.0, 0.0, 0.0),
 ]
-BASE = Body(np.array([[0.004, -0.003, 0.0505]]), Rotation.from_euler("xyz", [0.2, -0.3, 2.0], degrees=True))
-MARKERS = Body(np.array([[0.003, 0.0, -0.004]]), Rotation.from_euler("xyz", [0.5, -0.3, 0.4], degrees=True))
+BASE = MarkerPoses(np.array([[0.004, -0.003, 0.0505]]), Rotation.from_euler("xyz", [0.2, -0.3, 2.0], degrees=True))
+MARKERS = MarkerPoses(np.array([[0.003, 0.0, -0.004]]), Rotation.from_euler("xyz", [0.5, -0.3, 0.4], degrees=True))
 """Not far from what the fit expects, since the data do not tell all of it."""
-CUBE = Body(np.array([[0.501, 0.003, -0.0175]]), Rotation.from_euler("z", 4.0, degrees=True))
+CUBE = MarkerPoses(np.array([[0.501, 0.003, -0.0175]]), Rotation.from_euler("z", 4.0, degrees=True))
 LIFT_M = 0.009
 ZERO_S = 1.3
 """Time in the recordings at which the schedule starts."""
@@ -69,13 +69,13 @@ def _columns(position: np.ndarray, rotation: Rotation) -> np.ndarray:
     return np.hstack([position * 1e3, rest, rotation.as_matrix().transpose(0, 2, 1).reshape(-1, 9)])
 
 
-def _pushed(time: np.ndarray) -> Body:
+def _pushed(time: np.ndarray) -> MarkerPoses:
     position = np.repeat(CUBE.position, len(time), 0)
     position[:, 0] += 0.02 * np.clip(time - 12.0, 0.0, 2.0)
-    return Body(position, Rotation.concatenate([CUBE.rotation] * len(time)))
+    return MarkerPoses(position, Rotation.concatenate([CUBE.rotation] * len(time)))
 
 
-def _write_run(repository: Path, experiment: int, duration_s: float, seed: int) -> tuple[np.ndarray, Body]:
+def _write_run(repository: Path, experiment: int, duration_s: float, seed: int) -> tuple[np.ndarray, MarkerPoses]:
     """Writes a recording; returns the times and the poses of the hand in the base link."""
     time, random = np.arange(0.0, duration_s, 0.01), np.random.default_rng(seed)
     hand = ArmKinematics(repository / URDF).hand(_angles(experiment, time))

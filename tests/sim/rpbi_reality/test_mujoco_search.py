@@ -11,8 +11,8 @@ from real_contacts import toss_arrays, write
 
 from rpbi_reality.evaluation import world_file
 from rpbi_reality.identification.identify import read_fit
+from rpbi_reality.identification.mujoco_search import MujocoEvaluator, fit_mujoco, settings
 from rpbi_reality.tosses.mujoco_cube import MujocoCube
-from rpbi_reality.tosses.mujoco_search import MujocoEvaluator, fit_mujoco, settings
 from rpbi_reality.tosses.toss_data import Start, TossData
 
 CONFIG = read_fit(Path(world_file("tosses/fit_mujoco.yaml")))

@@ -7,7 +7,7 @@ import pytest
 
 from rpbi_reality.identification import uncertainty as module
 from rpbi_reality.identification.fit_config import FitConfig
-from rpbi_reality.identification.search import Found
+from rpbi_reality.identification.search import Found, slopes
 from rpbi_reality.identification.uncertainty import lower_percent, uncertainty
 
 CONFIG = FitConfig.parse(
@@ -45,3 +45,11 @@ def test_intervals_of_few_runs_hold(monkeypatch):
 @pytest.mark.parametrize(("count", "percent"), [(10, 0.85), (20, 1.59), (10_000, 2.5)])
 def test_few_runs_widen_the_percentiles(count, percent):
     assert lower_percent(count) == pytest.approx(percent, abs=0.02)
+
+
+def test_slopes_do_not_count_jumps():
+    smooth, jump_above, jump_below = (lambda x: x**2), (lambda x: 3.0 * x + (x > 0.5)), (lambda x: 3.0 * x - (x < 0.5))
+    rows = np.array([[each(x) for each in (smooth, jump_above, jump_below)] for x in (0.49, 0.5, 0.51)])
+    assert slopes(*rows, 0.01, 0.01) == pytest.approx([1.0, 3.0, 3.0])
+    assert slopes(rows[0], rows[0], rows[1], 0.0, 0.01)[0] == pytest.approx(0.99)  # at the lower bound
+    assert (rows[2] - rows[0])[1] / 0.02 > 50.0  # the central difference counts it

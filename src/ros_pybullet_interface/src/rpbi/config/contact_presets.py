@@ -27,14 +27,14 @@ CONTACT_PRESETS: dict[str, ContactPreset] = {
     "impact": ContactPreset(
         {
             "changeDynamics": {
-                "lateralFriction": 0.168,
-                "restitution": 0.06,
-                "contactStiffness": 21200.0,
-                "contactDamping": 58.0,
+                "lateralFriction": 0.17,
+                "restitution": 0.061,
+                "contactStiffness": 20300.0,
+                "contactDamping": 56.4,
                 "linearDamping": 0.0,
                 "angularDamping": 0.0,
             },
-            "contactFriction": {"edge": 0.169, "face": 0.199},
+            "contactFriction": {"edge": 0.167, "face": 0.204},
         },
         {"timeStep": 0.00168918919},
     ),

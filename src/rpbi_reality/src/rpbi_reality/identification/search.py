@@ -127,7 +127,7 @@ def _least_squares(
         return np.concatenate([*evaluation.residuals, space.prior(space.values(unit))])
 
     def jacobian(unit: np.ndarray) -> np.ndarray:
-        """Central differences; one-sided at the bounds."""
+        """Differences to both sides, see `slopes`; one-sided at the bounds."""
         low = np.maximum(unit - DIFFERENCE, 0.0)
         high = np.minimum(unit + DIFFERENCE, 1.0)
         steps = [np.where(np.arange(count) == i, side, unit) for i in range(count) for side in (low, high)]
@@ -135,10 +135,10 @@ def _least_squares(
         columns, priors = [], []
         for i in range(count):
             before, after = found[2 * i], found[2 * i + 1]
-            width = high[i] - low[i]
-            columns.append([(b - a) / width for a, b in zip(before.residuals, after.residuals)])
+            each = zip(before.residuals, last["residuals"], after.residuals)
+            columns.append([slopes(*rows_, unit[i] - low[i], high[i] - unit[i]) for rows_ in each])
             before_prior, after_prior = (space.prior(space.values(steps[2 * i + side])) for side in (0, 1))
-            priors.append((after_prior - before_prior) / width)
+            priors.append((after_prior - before_prior) / (high[i] - low[i]))
         last["jacobians"] = [np.stack([column[run] for column in columns], 1) for run in range(len(runs))]
         return np.vstack([*last["jacobians"], np.stack(priors, 1)])
 
@@ -158,6 +158,28 @@ def _least_squares(
     rows(solved.x)
     jacobian(solved.x)
     return Found(solved.x, np.zeros((0, count)), np.zeros((0, len(runs))), last["residuals"], last["jacobians"])
+
+
+def slopes(before: np.ndarray, here: np.ndarray, after: np.ndarray, back: float, ahead: float) -> np.ndarray:
+    """Returns the derivatives of residuals that contacts make jump at some values of a parameter.
+
+    The derivative is the central difference. Where the differences to both sides disagree by half, there is a jump on
+    one side, and the smaller difference is the derivative: a jump would count as sensitivity, and the intervals would
+    be too narrow.
+
+    Args:
+        before: Residuals at a smaller value, shape (n,).
+        here: Residuals at the value, shape (n,).
+        after: Residuals at a larger value, shape (n,).
+        back: Distance to the smaller value; 0 at a bound.
+        ahead: Distance to the larger value; 0 at a bound.
+    """
+    if not back or not ahead:
+        return (after - before) / (back + ahead)
+    left, right = (here - before) / back, (after - here) / ahead
+    smaller = np.where(abs(left) < abs(right), left, right)
+    agree = abs(left - right) <= 0.5 * np.maximum(abs(left), abs(right))
+    return np.where(agree, (after - before) / (back + ahead), smaller)
 
 
 def _cmaes(

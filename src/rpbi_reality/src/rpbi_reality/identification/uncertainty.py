@@ -37,7 +37,8 @@ def uncertainty(config: FitConfig, found: Found) -> Uncertainty:
     """Computes the uncertainty from what a search has evaluated, without further simulations.
 
     Least squares: one Gauss-Newton step from the optimum for each resample of runs. CMA-ES: for each resample, the
-    minimum of a quadratic function that is fitted to the errors of the evaluated candidates.
+    minimum of a quadratic function that is fitted to the errors of the evaluated candidates. These are resampled too,
+    since contacts make their errors rough.
     """
     space = ParameterSpace(config.parameters)
     random = np.random.default_rng(config.seed)
@@ -131,11 +132,11 @@ def _surrogate(found: Found, random: np.random.Generator) -> tuple[np.ndarray, n
     design = _quadratic(centred / scale)
     regular = np.eye(design.shape[1]) * 1e-2
     regular[0, 0] = 0.0
-    solve = np.linalg.solve(design.T @ design + regular, design.T)
     capped = np.minimum(found.runs, np.percentile(found.runs, 99))
 
-    def minimum(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        coefficients = solve @ means
+    def minimum(means: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        weighted = design.T * weights
+        coefficients = np.linalg.solve(weighted @ design + regular, weighted @ means)
         gradient = coefficients[1 : 1 + count]
         hessian = np.zeros((count, count))
         hessian[np.triu_indices(count)] = coefficients[1 + count :]
@@ -145,9 +146,10 @@ def _surrogate(found: Found, random: np.random.Generator) -> tuple[np.ndarray, n
         step = -vectors @ ((vectors.T @ gradient) / values)
         return np.clip(step, -3.0, 3.0), (vectors * values) @ vectors.T
 
-    _, hessian = minimum(capped.mean(1))
-    runs = capped.shape[1]
-    steps = np.array([minimum(means)[0] for means in _resamples(runs, random) @ capped.T / runs])
+    candidates, runs = capped.shape
+    _, hessian = minimum(capped.mean(1), np.ones(candidates))
+    means, weights = _resamples(runs, random) @ capped.T / runs, _resamples(candidates, random)
+    steps = np.array([minimum(*each)[0] for each in zip(means, weights)])
     return steps * scale, hessian / np.outer(scale, scale) / 2.0, runs
 
 

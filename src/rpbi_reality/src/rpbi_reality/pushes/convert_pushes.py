@@ -15,8 +15,8 @@ from custom_ros_tools.files import atomic_file
 from rpbi.world.file_kinds import load_main_file
 
 from ..pose_errors import unit_quaternions
-from .marker_calibration import EXPECTED, JOINTS, SPREAD, ArmKinematics, Calibration, MarkerFit
-from .motion_capture import Body, Recording, read_recording, read_simulated
+from .marker_calibration import EXPECTED, JOINTS, SPREAD, ArmKinematics, MarkerCalibration, MarkerFit
+from .motion_capture import CapturedRun, MarkerPoses, read_recording, read_simulated
 from .push_data import PushPoses, mean_poses
 
 RECORDINGS = "Data/MotionCapture"
@@ -52,7 +52,7 @@ class _Run(NamedTuple):
 
     experiment: int
     number: int
-    recording: Recording
+    recording: CapturedRun
 
     @property
     def session(self) -> tuple[int, bool]:
@@ -64,7 +64,7 @@ class _Session(NamedTuple):
     """Fitted transforms of a session: the arm's, and those of the cube's markers to the cube's centre."""
 
     fit: MarkerFit
-    calibration: Calibration
+    calibration: MarkerCalibration
     cube_turn: Rotation
     cube_lift: np.ndarray
 
@@ -148,13 +148,13 @@ def _files(folder: Path, experiment: int) -> list[Path]:
     return sorted(found, key=lambda path: path.stem)
 
 
-def _session(runs: list[_Run], arm: ArmKinematics, known: list[Calibration]) -> _Session:
+def _session(runs: list[_Run], arm: ArmKinematics, known: list[MarkerCalibration]) -> _Session:
     experiment = runs[0].experiment
     fit = MarkerFit(arm, MOVING[experiment], commanded_path(experiment))
     chosen = [_rows(run.recording.hand, np.linspace(60, len(run.recording.time) - 20, FRAMES)) for run in runs]
     expected, spread = EXPECTED, SPREAD
     if known:  # in experiment 2, the data do not tell the height of the base
-        mean = Calibration.of(np.mean([np.concatenate(each) for each in known], 0))
+        mean = MarkerCalibration.of(np.mean([np.concatenate(each) for each in known], 0))
         height = np.array([0.0, 0.0, mean.base_position[2]])
         expected = EXPECTED._replace(
             base_position=height, marker_position=mean.marker_position, marker_rotation=mean.marker_rotation
@@ -172,13 +172,13 @@ def _session(runs: list[_Run], arm: ArmKinematics, known: list[Calibration]) -> 
     return _Session(fit, calibration, rotation.inv() * yaw, yaw.inv().apply(lift))
 
 
-def _rows(body: Body, rows: np.ndarray) -> Body:
+def _rows(body: MarkerPoses, rows: np.ndarray) -> MarkerPoses:
     return body.rows(np.unique(np.clip(rows.astype(int), 0, len(body.position) - 1)))
 
 
-def _joined(bodies: list[Body]) -> Body:
+def _joined(bodies: list[MarkerPoses]) -> MarkerPoses:
     positions, rotations = zip(*bodies)
-    return Body(np.concatenate(positions), Rotation.concatenate(rotations))
+    return MarkerPoses(np.concatenate(positions), Rotation.concatenate(rotations))
 
 
 def _converted(run: _Run, session: _Session, path: Path) -> tuple[dict[str, np.ndarray], float]:
@@ -191,7 +191,7 @@ def _converted(run: _Run, session: _Session, path: Path) -> tuple[dict[str, np.n
     all_angles = np.full((len(angles), JOINTS), np.nan)
     all_angles[:, MOVING[run.experiment]] = angles
     hand, cube = calibration.hand(recording.hand), calibration.in_base(recording.cube)
-    cube = Body(cube.position, cube.rotation * session.cube_turn)
+    cube = MarkerPoses(cube.position, cube.rotation * session.cube_turn)
     return {
         "time": recording.time - zero,
         "hand_position": hand.position,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from robot_model.chain import Chain
 
-from .motion_capture import Body
+from .motion_capture import MarkerPoses
 
 BASE, HAND = "m1n6s300_link_base", "m1n6s300_link_6"
 JOINTS = 6
@@ -41,7 +41,7 @@ class ArmKinematics:
         self.last_turn = Rotation.from_euler("xyz", self._joints[-1].rpy)
         """Orientation of the last joint's frame in its parent link."""
 
-    def hand(self, angles: np.ndarray) -> Body:
+    def hand(self, angles: np.ndarray) -> MarkerPoses:
         """Returns the pose of the hand's link in the base link.
 
         Args:
@@ -54,10 +54,10 @@ class ArmKinematics:
             if joint.is_moving:
                 rotation = rotation * Rotation.from_rotvec(np.outer(angles[:, index], joint.axis))
                 index += 1
-        return Body(position, rotation)
+        return MarkerPoses(position, rotation)
 
 
-class Calibration(NamedTuple):
+class MarkerCalibration(NamedTuple):
     """Transforms of a session.
 
     Attributes:
@@ -75,24 +75,24 @@ class Calibration(NamedTuple):
     zeros: np.ndarray
 
     @classmethod
-    def of(cls, flat: np.ndarray) -> Calibration:
+    def of(cls, flat: np.ndarray) -> MarkerCalibration:
         """Returns a calibration from its 18 numbers."""
         return cls(*np.split(flat, (3, 6, 9, 12)))
 
-    def in_base(self, body: Body) -> Body:
+    def in_base(self, body: MarkerPoses) -> MarkerPoses:
         """Returns poses in the base link instead of the frame of the motion capture."""
         turn = Rotation.from_rotvec(self.base_rotation).inv()
-        return Body(turn.apply(body.position - self.base_position), turn * body.rotation)
+        return MarkerPoses(turn.apply(body.position - self.base_position), turn * body.rotation)
 
-    def hand(self, markers: Body) -> Body:
+    def hand(self, markers: MarkerPoses) -> MarkerPoses:
         """Returns the poses of the hand's link in the base link, from those of its markers."""
         inside = self.in_base(markers)
         rotation = inside.rotation * Rotation.from_rotvec(self.marker_rotation).inv()
-        return Body(inside.position - rotation.apply(self.marker_position), rotation)
+        return MarkerPoses(inside.position - rotation.apply(self.marker_position), rotation)
 
 
-EXPECTED = Calibration(np.array([0.0, 0.0, 0.05]), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(JOINTS))
-SPREAD = Calibration(
+EXPECTED = MarkerCalibration(np.array([0.0, 0.0, 0.05]), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(JOINTS))
+SPREAD = MarkerCalibration(
     np.full(3, 0.02),
     np.radians([0.5, 0.5, 5.0]),  # the base is upright
     np.full(3, 0.03),
@@ -114,9 +114,9 @@ class MarkerFit:
     def __init__(self, arm: ArmKinematics, moving: list[int], path: np.ndarray) -> None:
         self._arm, self._moving, self._path = arm, moving, path
 
-    def _residuals(self, calibration: np.ndarray, angles: np.ndarray, markers: Body) -> np.ndarray:
+    def _residuals(self, calibration: np.ndarray, angles: np.ndarray, markers: MarkerPoses) -> np.ndarray:
         """Returns differences between model and markers [m], shape (n, 6)."""
-        each = Calibration.of(calibration)
+        each = MarkerCalibration.of(calibration)
         joints = np.tile(each.zeros, (len(angles), 1))
         joints[:, self._moving] = angles
         hand = self._arm.hand(joints)
@@ -126,19 +126,21 @@ class MarkerFit:
         turn = (markers.rotation.inv() * rotation).as_rotvec()
         return np.hstack([position - markers.position, turn * ROTATION_M])
 
-    def _by_calibration(self, calibration: np.ndarray, angles: np.ndarray, markers: Body) -> np.ndarray:
+    def _by_calibration(self, calibration: np.ndarray, angles: np.ndarray, markers: MarkerPoses) -> np.ndarray:
         """Returns the derivatives of the residuals, shape (n, 6, 18)."""
         steps = 1e-5 * np.eye(len(calibration))
         sides = [[self._residuals(calibration + s * e, angles, markers) for s in (-1, 1)] for e in steps]
         return np.stack([(after - before) / 2e-5 for before, after in sides], 2)
 
-    def _by_angles(self, calibration: np.ndarray, angles: np.ndarray, markers: Body) -> np.ndarray:
+    def _by_angles(self, calibration: np.ndarray, angles: np.ndarray, markers: MarkerPoses) -> np.ndarray:
         """Returns the derivatives of the residuals, shape (n, 6, joints)."""
         steps = 1e-5 * np.eye(len(self._moving))
         sides = [[self._residuals(calibration, angles + s * e, markers) for s in (-1, 1)] for e in steps]
         return np.stack([(after - before) / 2e-5 for before, after in sides], 2)
 
-    def angles(self, calibration: Calibration, markers: Body, first: np.ndarray | None = None) -> np.ndarray:
+    def angles(
+        self, calibration: MarkerCalibration, markers: MarkerPoses, first: np.ndarray | None = None
+    ) -> np.ndarray:
         """Returns the angles [rad] of the moving joints that fit each frame best, shape (n, joints).
 
         Args:
@@ -155,7 +157,7 @@ class MarkerFit:
                 break
         return angles
 
-    def _nearest(self, markers: Body) -> np.ndarray:
+    def _nearest(self, markers: MarkerPoses) -> np.ndarray:
         hand = self._arm.hand(self._path)
         known = np.hstack([hand.position + EXPECTED.base_position, hand.rotation.as_matrix().reshape(-1, 9) * 0.1])
         seen = np.hstack([markers.position, markers.rotation.as_matrix().reshape(-1, 9) * 0.1])
@@ -163,8 +165,8 @@ class MarkerFit:
         return self._path[distances.argmin(1)][:, self._moving]
 
     def calibration(
-        self, markers: Body, expected: Calibration = EXPECTED, spread: Calibration = SPREAD
-    ) -> tuple[Calibration, np.ndarray]:
+        self, markers: MarkerPoses, expected: MarkerCalibration = EXPECTED, spread: MarkerCalibration = SPREAD
+    ) -> tuple[MarkerCalibration, np.ndarray]:
         """Fits a calibration by variable projection (Golub and Pereyra 1973): the angles follow from the calibration.
 
         Args:
@@ -180,7 +182,7 @@ class MarkerFit:
 
         def rows(given: np.ndarray) -> np.ndarray:
             nonlocal angles
-            angles = self.angles(Calibration.of(given), markers, angles)
+            angles = self.angles(MarkerCalibration.of(given), markers, angles)
             scaled = self._residuals(given, angles, markers) * weights[:, None] / NOISE_M
             return np.concatenate([scaled.ravel(), (given - mean) / deviation])
 
@@ -194,4 +196,4 @@ class MarkerFit:
             flat = least_squares(rows, flat, slopes, x_scale=deviation, xtol=1e-6, ftol=1e-6, max_nfev=30).x
             distance = np.linalg.norm(self._residuals(flat, angles, markers), axis=1)
             weights = (1.0 + (distance / OUTLIER_M) ** 2) ** -0.25
-        return Calibration.of(flat), distance
+        return MarkerCalibration.of(flat), distance

@@ -20,24 +20,24 @@ SIMULATED_COLUMNS = 14
 """Columns of a simulated run: position and quaternion of hand and cube."""
 
 
-class Body(NamedTuple):
+class MarkerPoses(NamedTuple):
     """Poses of a marker body in the frame of the motion capture: positions [m], shape (n, 3), and n orientations."""
 
     position: np.ndarray
     rotation: Rotation
 
-    def rows(self, chosen: slice | np.ndarray) -> Body:
+    def rows(self, chosen: slice | np.ndarray) -> MarkerPoses:
         """Returns some of the poses."""
-        return Body(self.position[chosen], self.rotation[chosen])
+        return MarkerPoses(self.position[chosen], self.rotation[chosen])
 
 
-class Recording(NamedTuple):
+class CapturedRun(NamedTuple):
     """A recording: times [s], shape (n,), and the bodies; frames in which a body was lost are left out."""
 
     time: np.ndarray
-    base: Body
-    hand: Body
-    cube: Body
+    base: MarkerPoses
+    hand: MarkerPoses
+    cube: MarkerPoses
 
 
 def _numbers(path: Path, separator: str, columns: int) -> np.ndarray:
@@ -56,7 +56,7 @@ def _numbers(path: Path, separator: str, columns: int) -> np.ndarray:
         raise fault(path, "", f"expected a table of {columns} columns of numbers: {error}") from None
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path) -> CapturedRun:
     """Reads a file `*_6D.tsv`.
 
     Raises:
@@ -75,7 +75,7 @@ def read_recording(path: Path) -> Recording:
     time = table[valid, 1]
     if (np.diff(time) <= 0.0).any():
         raise fault(path, "time", "expected increasing times in the second column")
-    return Recording(time, *(Body(p[valid], Rotation.from_matrix(m[valid])) for p, m in bodies.values()))
+    return CapturedRun(time, *(MarkerPoses(p[valid], Rotation.from_matrix(m[valid])) for p, m in bodies.values()))
 
 
 def read_simulated(path: Path) -> np.ndarray | None:

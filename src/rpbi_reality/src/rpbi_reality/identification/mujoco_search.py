@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..identification.candidate import mean_error
-from ..identification.evaluator import DIVERGED, Evaluation
-from ..identification.fit_config import FitConfig
-from ..identification.identify import chosen_runs, read_fit
-from ..identification.recordings import PoseTrack
-from ..identification.search import ParameterSpace, search
-from ..identification.uncertainty import uncertainty
-from .mujoco_cube import MEASURED, MujocoCube, MujocoSettings
-from .toss_data import TossData
-from .toss_world import toss_errors
+from ..tosses.mujoco_cube import MEASURED, MujocoCube, MujocoSettings
+from ..tosses.toss_data import TossData
+from ..tosses.toss_world import toss_errors
+from .candidate import mean_error
+from .evaluator import DIVERGED, Evaluation
+from .fit_config import FitConfig
+from .identify import chosen_runs, read_fit
+from .recordings import PoseTrack
+from .search import ParameterSpace, search
+from .uncertainty import uncertainty
 
 
 class MujocoFit(NamedTuple):

@@ -1,0 +1,67 @@
+"""From a recording of a running simulator to the parameters of its twin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import rosbag
+import rospy
+import yaml
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+
+from ros_pybullet_interface.msg import PlannedInput
+from ros_pybullet_interface.srv import StepN, StepWithInputs
+from rpbi_reality.evaluation import world_file
+from rpbi_reality.identification.fit_config import FitConfig
+from rpbi_reality.identification.identify import identify_world
+
+GAIN, DELAY_S, STEP_S = 0.07, 0.012, 0.004
+STEPS = 1000
+FIT = {
+    "runs": {"count": 1},
+    "measured": {"arm": {"object": "arm", "joint_sigma": 0.001}},
+    "parameters": {
+        "gain": {"set": "arm.setJointMotorControlArray.positionGains", "bounds": [0.01, 0.2], "scale": "log"},
+        "delay": {"set": "inputs.arm/target.delay_s", "bounds": [0.0, 0.05]},
+    },
+}
+
+
+def _world(**motors: float) -> dict[str, Any]:
+    arm: dict[str, Any] = {"file": world_file("identification/arm.yaml"), "joint_state_publisher_hz": 250.0}
+    return {
+        "connect": {"connection_mode": "DIRECT"},
+        "timeStep": STEP_S,
+        "start_pybullet_after_initialization": False,
+        "robots": [arm | ({"setJointMotorControlArray": motors} if motors else {})],
+    }
+
+
+def test_gain_and_delay_of_a_recorded_arm_are_found(ros, tmp_path):
+    ros.simulator(_world(positionGains=GAIN), use_sim_time=True)
+    states = ros.listen("/rpbi/arm/joint_states", JointState)
+    before = ros.call("/rpbi/step_n", StepN, 1)
+    goals = np.random.default_rng(4).uniform(-1.0, 1.0, 8).tolist()
+    planned = [PlannedInput(25 + 120 * i, "arm/target", ["shoulder"], [goal]) for i, goal in enumerate(goals)]
+    answer = ros.call("/rpbi/step_with_inputs", StepWithInputs, STEPS, planned)
+    assert answer.success, answer.message
+    wait_until(lambda: states.stamps_ns and states.stamps_ns[-1] == answer.stamp.to_nsec(), "the last tick arrives")
+    recorded = [message for message in states.messages if message.header.stamp >= before.stamp]
+    assert len(recorded) > STEPS * 0.9
+    path = tmp_path / "run.bag"
+    with rosbag.Bag(str(path), "w") as bag:
+        for message in recorded:
+            bag.write("/rpbi/arm/joint_states", message, message.header.stamp)
+        for each in planned:
+            sent = JointState(name=list(each.names), position=list(each.values))
+            sent.header.stamp = before.stamp + rospy.Duration.from_sec(each.tick * STEP_S - DELAY_S)
+            bag.write("/rpbi/arm/joint_states/target", sent, sent.header.stamp)
+    twin = tmp_path / "world.yaml"
+    twin.write_text(yaml.safe_dump(_world()))
+    found = identify_world(str(twin), path, FitConfig.parse(FIT, "fit.yaml"), 1)
+    assert found.values["gain"] == pytest.approx(GAIN, rel=0.02)
+    assert found.values["delay"] == pytest.approx(DELAY_S, abs=STEP_S / 4.0)
+    assert found.after.mean < 0.2 < 1.0 < found.before.mean
