@@ -68,6 +68,12 @@ QUESTIONS = {
     "color image": ("cameras",),
     "suction": ("hands",),
     "friction": ("dynamics", "contacts", "physics"),
+    "export dataset to lerobot": ("datasets",),
+    "change simulation timestep": ("time",),
+    "pick and place": ("scenes",),
+    "own URDF": ("robots",),
+    "ground truth pose of object": ("topics_and_services",),
+    "simulation is unstable": ("physics", "questions", "slow"),
 }
 """Questions about simulators; for each, pages of which one has the answer."""
 
