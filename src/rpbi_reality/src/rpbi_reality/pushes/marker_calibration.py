@@ -171,7 +171,7 @@ class MarkerFit:
 
         Args:
             markers: Measured poses of the hand's markers.
-            expected: What is expected without data.
+            expected: Most likely calibration without data.
             spread: Standard deviations of `expected`.
 
         Returns:
