@@ -171,7 +171,7 @@ def ros2(path: Path) -> None:
     drawing.box(Box(534, 16, 250, 218), PLAIN, "programs with ROS 2", centred=False)
     world = drawing.box(Box(32, 60, 170, 158), SIMULATOR, "simulator, nodes", ["topics of ROS 1,", "services"])
     bridge = drawing.box(Box(250, 60, 170, 158), GUARD, "the bridge", ["rpbi_ros2,", "Cyclone DDS"])
-    nodes = drawing.box(Box(550, 60, 218, 66), PEOPLE, "rclpy, rclcpp, RViz 2", ["the same names of topics"])
+    nodes = drawing.box(Box(550, 60, 218, 66), PEOPLE, "your programs", ["tested: rclpy, Fast DDS"])
     companion = drawing.box(
         Box(550, 144, 218, 74), PEOPLE, "the companion", ["services and actions", "of the simulator"]
     )
