@@ -74,6 +74,9 @@ QUESTIONS = {
     "own URDF": ("robots",),
     "ground truth pose of object": ("topics_and_services",),
     "simulation is unstable": ("physics", "questions", "slow"),
+    "how do I export a dataset to LeRobot": ("datasets",),
+    "how to change the gravity": ("time", "worlds", "dynamics", "commands"),
+    "why is my robot not moving": ("questions", "robots"),
 }
 """Questions about simulators; for each, pages of which one has the answer."""
 

@@ -93,7 +93,7 @@ def on_nav(nav: Navigation, config: Any, files: Files) -> None:
 
 
 def on_post_build(config: Any) -> None:
-    """Writes llms.txt from the navigation, and the pages' Markdown, to which it leads."""
+    """Writes llms.txt from the navigation, and the pages' Markdown, to which it leads; adds query.js to the search."""
     site = Path(config.site_dir)
     lines = [f"# {config.site_name}", "", f"> {config.site_description}.", ""]
     for section in config.extra["nav"].items:
@@ -101,6 +101,9 @@ def on_post_build(config: Any) -> None:
         for page in pages_of(section):
             (site / page.file.src_uri).write_text(page.markdown, encoding="utf-8")
     (site / "llms.txt").write_text("\n".join(lines), encoding="utf-8")
+    (worker,) = site.glob("assets/javascripts/workers/search.*.min.js")
+    query = (HERE / "query.js").read_text(encoding="utf-8")
+    worker.write_text(query + worker.read_text(encoding="utf-8"), encoding="utf-8")
 
 
 def pages_of(item: Any) -> list[Page]:

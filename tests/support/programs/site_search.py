@@ -11,7 +11,9 @@ from py_mini_racer import MiniRacer
 BROWSER = """
 var self = globalThis, answers = [], ask;
 self.console = {warn: (text) => { throw new Error(text); }};
-self.addEventListener = (kind, handler) => { ask = (type, data) => { handler({data: {type, data}}); }; };
+var handlers = [];
+self.addEventListener = (kind, handler) => { handlers.push(handler); };
+ask = (type, data) => { const event = {data: {type, data}}; handlers.forEach((each) => each(event)); };
 self.postMessage = (message) => answers.push(message.data);
 """
 """The functions of a browser that the worker calls."""
