@@ -126,8 +126,8 @@ def _least_squares(
         last["residuals"] = evaluation.residuals
         return np.concatenate([*evaluation.residuals, space.prior(space.values(unit))])
 
-    def jacobian(unit: np.ndarray) -> np.ndarray:
-        """Differences to both sides, see `slopes`; one-sided at the bounds."""
+    def jacobian(unit: np.ndarray, counts_jumps: bool = True) -> np.ndarray:
+        """Central differences, one-sided at the bounds; see `slopes` for differences that do not count jumps."""
         low = np.maximum(unit - DIFFERENCE, 0.0)
         high = np.minimum(unit + DIFFERENCE, 1.0)
         steps = [np.where(np.arange(count) == i, side, unit) for i in range(count) for side in (low, high)]
@@ -136,7 +136,10 @@ def _least_squares(
         for i in range(count):
             before, after = found[2 * i], found[2 * i + 1]
             each = zip(before.residuals, last["residuals"], after.residuals)
-            columns.append([slopes(*rows_, unit[i] - low[i], high[i] - unit[i]) for rows_ in each])
+            if counts_jumps:
+                columns.append([(b - a) / (high[i] - low[i]) for a, _, b in each])
+            else:
+                columns.append([slopes(*rows_, unit[i] - low[i], high[i] - unit[i]) for rows_ in each])
             before_prior, after_prior = (space.prior(space.values(steps[2 * i + side])) for side in (0, 1))
             priors.append((after_prior - before_prior) / (high[i] - low[i]))
         last["jacobians"] = [np.stack([column[run] for column in columns], 1) for run in range(len(runs))]
@@ -156,7 +159,7 @@ def _least_squares(
         ftol=1e-6,
     )
     rows(solved.x)
-    jacobian(solved.x)
+    jacobian(solved.x, counts_jumps=False)  # for the uncertainty
     return Found(solved.x, np.zeros((0, count)), np.zeros((0, len(runs))), last["residuals"], last["jacobians"])
 
 
