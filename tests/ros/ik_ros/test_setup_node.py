@@ -239,3 +239,9 @@ def test_simulated_robot_is_asked_itself(ros, target):
             return math.dist((p.x, p.y, p.z), (0.5, 0.1, 0.6)) < 5e-3
 
         wait_until(is_there, "the arm goes to the target")
+
+
+def test_empty_configuration_that_deleted_parameters_leave_counts_as_none(ros, target):
+    start_setup(ros, "pybullet", **FRAMES, hz=100.0, config={})
+    problems = ros.listen("ik", IKProblem)
+    hear(problems, target, lambda each: each.has_target, "problems come")

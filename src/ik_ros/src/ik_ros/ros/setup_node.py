@@ -167,7 +167,7 @@ def main() -> None:
 
     def make(name: str) -> object:
         trust_only_what_was_named()
-        if name == "pybullet" and rospy.has_param("~config"):
+        if name == "pybullet" and rospy.get_param("~config", {}):  # deleted parameters leave an empty mapping
             return RobotIKSetup()
         if name == "exotica" and not rospy.has_param("~child_frame_id"):
             return ExoticaSetup()
