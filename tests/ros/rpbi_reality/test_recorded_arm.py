@@ -40,6 +40,7 @@ def _world(**motors: float) -> dict[str, Any]:
     }
 
 
+@pytest.mark.thorough
 def test_gain_and_delay_of_a_recorded_arm_are_found(ros, tmp_path):
     ros.simulator(_world(positionGains=GAIN), use_sim_time=True)
     states = ros.listen("/rpbi/arm/joint_states", JointState)
