@@ -129,8 +129,7 @@ def human_interaction(path: Path) -> None:
             return bool(force.message.wrench.force.z > 3.5)
 
         wait_until(presses, "the arm presses on the box")
-        time.sleep(RESTS_S)
-        window = grab(handle)
+        window = grab(handle)  # at once: a wall loses its force while the hand rests
         stage.stop_world()
         xdotool("windowraise", rviz.number)
         scene = stage.still_picture()
