@@ -21,6 +21,7 @@ from rpbi_utils.msg import DriverState
 
 SLOW_S = 120.0
 SLOW = re.compile("too slow: a cycle takes|the task is not done: the solver took .* ms, expected at most")
+"""Messages by which the node says that the computer is too slow for a real robot."""
 START, END, HEIGHT = (0.33, -0.3), (0.33, -0.08), 0.712
 """Ends of the line, and height of what RViz shows [m]."""
 REPORT = ("cycles.csv", "path.png", "errors.png", "cycles.png")

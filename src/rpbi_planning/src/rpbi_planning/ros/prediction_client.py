@@ -6,18 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import rospy
 
 from custom_ros_tools.errors import InterfaceError
 from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import Candidate, PlannedInput, Prediction
 from ros_pybullet_interface.srv import Predict
+from rpbi_planning.foresee import SETTLING_S
 
 SERVICE = "rpbi/predict"
 SERVER_S = 5.0
 """Longest time to wait for the service [s]."""
-SETTLING_S = 0.2
-"""Time after the end of the motion that is simulated, too [s]."""
 EVERY_S = 0.005
 """Time between two samples of the prediction [s]."""
 MOVED_M = 1e-3
@@ -43,10 +43,8 @@ def predicted(
         InterfaceError: If the simulator does not answer, or cannot predict the motion.
     """
     moving = math.ceil(trajectory.duration_s / dt_s)
-    inputs = [
-        PlannedInput(tick, f"{robot}/target", list(joint_names), trajectory.at((tick + 1) * dt_s).tolist())
-        for tick in range(moving)
-    ]
+    targets = trajectory.at(np.arange(1, moving + 1) * dt_s).tolist()
+    inputs = [PlannedInput(tick, f"{robot}/target", list(joint_names), q) for tick, q in enumerate(targets)]
     ticks, every = moving + round(SETTLING_S / dt_s), max(round(EVERY_S / dt_s), 1)
     ticks += -ticks % every  # so that the last state is among the samples
     try:
