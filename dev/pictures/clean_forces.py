@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from plots import legend_below, new_figure, save
+from plots import new_figure, save
 from pushes import COMPLIANT, PLANE, Force, pushed
 
-from custom_ros_tools.plot_style import BLUE, INK, ORANGE
+from custom_ros_tools.plot_style import BLUE, INK, ORANGE, legend_below
 
 BEFORE, AFTER = ORANGE, BLUE
 """Colours of a push without and with a setting."""

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from files import give_palette
-from plots import legend_below, new_figure, save
+from plots import new_figure, save
 from pushes import example
 
 from custom_ros_tools.config import load_config
-from custom_ros_tools.plot_style import BLUE, GREEN, GREY, INK, ORANGE
+from custom_ros_tools.plot_style import BLUE, GREEN, GREY, INK, ORANGE, legend_below
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
 from ik_ros.problem_stream import JointRateLimiter, JointRateLimiterConfig, ProblemStream

@@ -14,6 +14,15 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 IMAGES = HERE.parents[1] / "docs/images"
 PICTURES: dict[str, str] = {
+    "card_contacts.png": "guides:draw_contacts_card",
+    "card_tutorial.png": "cards:draw",
+    "card_guard.png": "cards:draw",
+    "card_people.png": "cards:draw",
+    "card_planning.png": "cards:draw",
+    "card_data.png": "cards:draw",
+    "card_learning.png": "cards:draw",
+    "card_reality.png": "cards:draw",
+    "card_viewers.png": "cards:draw",
     "demo.png": "rviz_worlds:demo",
     "record_replay_fork.gif": "record_replay_fork:draw",
     "architecture.svg": "diagrams:architecture",

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cards import SIZE as CARD
 from files import write_png
 from overlay import Overlay
 from PIL import Image
@@ -43,9 +44,9 @@ GRIP_METRES_A_NEWTON = 0.004
 """Length of the arrows at the fingers [m/N]."""
 POSTURE = (0.3, 0.6, 0.0, -1.2, 0.0, 0.9, 0.0)
 """Joint positions of the arm whose frames are drawn [rad]."""
-ABOVE_M = 1.75
+ABOVE_M = 1.25
 """Height of the cube in the first picture of the soft body [m]."""
-CARRIED_S = 1.0
+CARRIED_S = 2.6
 """Time for which the belt of the template has carried the parcel [s]."""
 AXIS_M, AXES = 0.11, ("#e02020", "#18a018", "#2050f0")
 """Length of the drawn axes [m], and their colours, as in RViz: red, green, blue."""
@@ -53,7 +54,23 @@ AXIS_M, AXES = 0.11, ("#e02020", "#18a018", "#2050f0")
 
 def draw_contacts(path: Path) -> None:
     """Draws the forces on a box that an arm pushes over the floor."""
-    camera = Photographer((-0.62, -0.78, 0.42), (-0.13, -0.22, 0.06), 27.0, (900, 560))
+    view, points = _contacts(27.0, (900, 560))
+    arm = [point for point in points if point.other_body == "kuka_lwr"]
+    floor = max((each for each in points if each.other_body == "floor"), key=lambda each: each.normal_force)
+    view.words(_ends(arm[0])[0], f"force of the arm: {sum(each.normal_force for each in arm):.1f} N", ORANGE, (-60, 26))
+    view.words(_ends(floor)[0], f"force of the floor: {floor.normal_force:.1f} N here", BLUE, (-110, 26))
+    write_png(path, view.picture(), dither=True)
+
+
+def draw_contacts_card(path: Path) -> None:
+    """Draws the same forces without words, for the home page."""
+    view, _ = _contacts(21.0, CARD)
+    write_png(path, view.picture(), dither=True)
+
+
+def _contacts(fov_deg: float, size: tuple[int, int]) -> tuple[Overlay, list[ContactPoint]]:
+    """Returns a picture of a pushed box with arrows for its contact forces, and the contacts."""
+    camera = Photographer((-0.62, -0.78, 0.42), (-0.13, -0.22, 0.06), fov_deg, size)
     with tempfile.TemporaryDirectory(prefix="rpbi-") as folder:
         world = example(Path(folder))
         push(world, length_m=PUSHED_M)
@@ -63,11 +80,7 @@ def draw_contacts(path: Path) -> None:
     for point in points:
         if point.normal_force > SHOWN_N:
             view.arrow(*_ends(point), ORANGE if point.other_body == "kuka_lwr" else BLUE, 5.0)
-    arm = [point for point in points if point.other_body == "kuka_lwr"]
-    floor = max((each for each in points if each.other_body == "floor"), key=lambda each: each.normal_force)
-    view.words(_ends(arm[0])[0], f"force of the arm: {sum(each.normal_force for each in arm):.1f} N", ORANGE, (-60, 26))
-    view.words(_ends(floor)[0], f"force of the floor: {floor.normal_force:.1f} N here", BLUE, (-110, 26))
-    write_png(path, view.picture(), dither=True)
+    return view, list(points)
 
 
 def draw_bases(path: Path) -> None:
@@ -130,19 +143,26 @@ def draw_hands(path: Path) -> None:
 
 
 def draw_soft_body(path: Path) -> None:
-    """Draws the soft torus before and while the cube lies on it."""
-    camera = Photographer((-2.2, -4.2, 2.0), (0.35, 0.0, 0.75), 31.0, (560, 460))
+    """Draws the soft torus before and while the cube lies on it, with the height of its side below the cube."""
+    camera = Photographer((-0.6, -5.6, 1.15), (0.25, 0.0, 0.76), 30.0, (680, 560))
     world = World.from_file(f"{CONFIGS}/soft_body/config.yaml")
-    cube: Any = world.bodies["cube"]
+    cube, torus = world.bodies["cube"], world.bodies["torus"]
     pictures = []
-    for caption in ("before the cube hits the torus", "when the cube is lowest"):
+    for caption in ("before the cube hits the torus", "the cube is lowest"):
         height_m = cube.base_pose().position[2]
         while pictures or height_m > ABOVE_M:
             world.step()
             before_m, height_m = height_m, cube.base_pose().position[2]
             if height_m > before_m:
                 break
-        pictures.append(with_caption(camera.picture(world), f"{world.clock.time_s:.2f} s: {caption}"))
+        view = Overlay(camera, camera.picture(world))
+        _, nodes = torus.pb.getMeshData(torus.body_id, -1, flags=torus.pb.MESH_DATA_SIMULATION_MESH)
+        for is_below_cube, x in ((False, -1.15), (True, 1.7)):
+            top_m = max(node[2] for node in nodes if (node[0] > 0.5 if is_below_cube else node[0] < -0.5))
+            colour = ORANGE if is_below_cube else BLUE
+            view.line([(x, 0.0, 0.0), (x, 0.0, top_m)], colour, 4.0)
+            view.words((x, 0.0, top_m), f"{100 * top_m:.0f} cm", colour, (-30, -18))
+        pictures.append(with_caption(view.picture(), f"{world.clock.time_s:.2f} s: {caption}"))
     world.close()
     write_png(path, beside(*pictures), dither=True)
 
@@ -204,9 +224,13 @@ def draw_extending(path: Path) -> None:
     world = World.from_file("{my_robot_lab}/configs/lab.yaml")
     while world.clock.time_s < CARRIED_S:
         world.step()
-    camera = Photographer((1.5, -1.5, 1.2), (0.2, -0.1, 0.25), 34.0, (900, 560))
+    camera = Photographer((0.75, -1.25, 1.15), (0.15, -0.05, 0.4), 36.0, (1000, 600))
     view = Overlay(camera, camera.picture(world))
-    for name, offset in (("parcel", (60.0, -60.0)), ("belt", (-150.0, 90.0)), ("pusher", (70.0, 130.0))):
+    view.line([(0.5, -0.2, 0.55), (0.5, 0.2, 0.55)], ORANGE, 3.0)
+    view.words((0.5, 0.2, 0.55), "beam of the range finder", ORANGE, (16, -26))
+    view.arrow((-0.55, 0.0, 0.505), (-0.25, 0.0, 0.505), BLUE)
+    view.words((-0.4, 0.0, 0.505), "0.4 m/s", BLUE, (-40, 30))
+    for name, offset in (("parcel", (-70.0, -60.0)), ("pusher", (60.0, 80.0))):
         body: Any = world.bodies[name]
         view.pointer(body.base_pose().position, name, offset)
     world.close()

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
-from plots import GOOD, empty_figure, legend_below, save, show
+from plots import GOOD, empty_figure, save, show
 from render import Photographer
 
 from custom_ros_tools.config import load_config
+from custom_ros_tools.plot_style import legend_below
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
 from ik_ros.solvers.tasks import TasksSolver

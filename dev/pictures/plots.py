@@ -44,13 +44,6 @@ def show(axes: Axes, picture: Image.Image) -> None:
     axes.axis("off")
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int = 1) -> None:
-    """Puts the legend of one of the axes below all plots of the figure."""
-    legend = figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=columns)
-    share = legend.get_window_extent().height / figure.bbox.height + 0.01
-    figure.get_layout_engine().set(rect=(0.0, share, 1.0, 1.0 - share))
-
-
 def save(figure: Figure, path: Path, has_photographs: bool = False) -> None:
     """Writes the figure with a palette, so that the file is small, and closes it.
 

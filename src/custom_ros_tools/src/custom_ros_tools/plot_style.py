@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, YELLOW = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"
 INK, GREY, PALE = "#22333f", "#7d8a94", "#dfe4e8"
@@ -64,6 +65,13 @@ def plot_style() -> Iterator[None]:
 def legend_beside(axes: Axes, **options: Any) -> None:
     """Puts the legend to the right of the data; `options` are those of `Axes.legend`."""
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **options)
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int = 1) -> None:
+    """Puts the legend of one of the axes below all plots of a figure with constrained layout."""
+    legend = figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=columns)
+    share = legend.get_window_extent().height / figure.bbox.height + 0.01
+    figure.get_layout_engine().set(rect=(0.0, share, 1.0, 1.0 - share))
 
 
 def name_lines(axes: Axes) -> None:

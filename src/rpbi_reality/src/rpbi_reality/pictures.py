@@ -6,17 +6,21 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.files import atomic_file
+from custom_ros_tools.plot_style import GREY, INK, ORANGE, legend_below, plot_style
 
 from .evaluation import PushResult, TossResult
 from .pose_errors import angle_deg
 from .pushes.push_data import mean_poses, times
 
-REAL, SIMULATED = "0.35", "tab:orange"
+REAL, SIMULATED, EACH_RUN = GREY, ORANGE, "#c3cbd1"
 _CORNERS = np.stack(np.meshgrid((-1, 1), (-1, 1), (-1, 1)), -1).reshape(-1, 3) * 0.5
-_EDGES = [(i, j) for i in range(8) for j in range(i) if abs(_CORNERS[i] - _CORNERS[j]).sum() == 1.0]
+_SHOWN = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Parts of the cube's way at which it is drawn."""
 
 
 def chosen_tosses(result: TossResult) -> dict[str, int]:
@@ -34,79 +38,79 @@ def write_pictures(folder: Path, tosses: TossResult | None, pushes: list[PushRes
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in figures.items():
         with atomic_file(folder / name) as part:
-            figure.savefig(part, dpi=100)
+            figure.savefig(part, dpi=200)
     return [folder / name for name in figures]
 
 
+@plot_style()
 def toss_figure(result: TossResult) -> Figure:
-    """Draws the real and the simulated cube from the side, and their distance and angle over time."""
-    figure = Figure(figsize=(13, 10), layout="constrained")
-    grid = figure.add_gridspec(3, 2, width_ratios=[2.2, 1])
-    for row, (name, index) in enumerate(chosen_tosses(result).items()):
+    """Draws the real and the simulated cube from the side, and the errors of position and rotation over time."""
+    figure = Figure(figsize=(10, 6.4), layout="constrained")
+    rows = figure.subplots(3, 3, width_ratios=[2.4, 1, 1])
+    for (side, distance, angle), (name, index) in zip(rows, chosen_tosses(result).items()):
         toss, (position, quaternion) = result.data.tosses[index], result.simulated(index)
-        side = figure.add_subplot(grid[row, 0])
         along = toss.position[-1, :2] - toss.position[0, :2]
         along = along / max(float(np.linalg.norm(along)), 1e-9)
-        frames = np.unique(np.linspace(0, len(toss.position) - 1, 7).astype(int))
-        for frame in frames:
-            _outline(side, along, toss.position[frame], toss.quaternion[frame], result.data.side, REAL)
-            _outline(side, along, position[frame], quaternion[frame], result.data.side, SIMULATED)
-        side.axhline(0.0, color="0.8", linewidth=1)
-        side.plot([], color=REAL, label="measured")
-        side.plot([], color=SIMULATED, label="simulated")
-        side.set(aspect="equal", xlabel="along the toss [m]", ylabel="height [m]")
-        side.set_title(f"{name}: toss {toss.name}, {result.errors.position[index]:.1f} % of the width", loc="left")
-        side.legend(loc="upper right")
-        errors = figure.add_subplot(grid[row, 1])
+        for frame in _frames(toss.position):
+            real = _outline(along, toss.position[frame], toss.quaternion[frame], result.data.side)
+            simulated = _outline(along, position[frame], quaternion[frame], result.data.side)
+            measured = side.add_patch(Polygon(real, facecolor=REAL, alpha=0.35, edgecolor="none"))
+            cube = side.add_patch(Polygon(simulated, fill=False, edgecolor=SIMULATED, linewidth=1.5))
+        measured.set_label("measured cube")
+        cube.set_label("simulated cube")
+        side.axhline(0.0, color=INK, linewidth=1)
+        side.set(aspect="equal", ylabel="height [m]")
+        side.autoscale_view()
+        side.set_title(f"{name} of {len(result.data.tosses)}: toss {toss.name}")
         time = np.arange(len(position)) / result.data.frame_rate
-        distance = np.linalg.norm(position - toss.position, axis=1) / result.data.side * 100.0
-        errors.plot(time, distance, color="tab:blue", label="position [% of the width]")
-        errors.plot(time, angle_deg(quaternion, toss.quaternion), color="tab:red", label="rotation [deg]")
-        errors.set(xlabel="time [s]", ylim=(0, None))
-        errors.grid(alpha=0.3)
-        errors.legend()
+        distance.plot(time, np.linalg.norm(position - toss.position, axis=1) / result.data.side * 100.0)
+        distance.set(ylabel="% of the width", ylim=(0, None))
+        distance.set_title(f"position: {result.errors.position[index]:.1f} %")
+        angle.plot(time, angle_deg(quaternion, toss.quaternion))
+        angle.set(ylabel="deg", ylim=(0, None))
+        angle.set_title(f"rotation: {result.errors.rotation[index]:.1f} deg")
+    for axes, label in zip(rows[-1], ("along the toss [m]", "time [s]", "time [s]")):
+        axes.set_xlabel(label)
+    legend_below(figure, rows[0, 0], 2)
     return figure
 
 
-def _outline(
-    axes: object, along: np.ndarray, position: np.ndarray, quaternion: np.ndarray, side: float, color: str
-) -> None:
-    """Draws the edges of a cube, projected on the vertical plane through the direction `along`."""
+def _frames(position: np.ndarray) -> list[int]:
+    """Returns the frames at which the cube has gone the parts `_SHOWN` of its way."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    return [int(np.searchsorted(way, part * way[-1])) for part in _SHOWN]
+
+
+def _outline(along: np.ndarray, position: np.ndarray, quaternion: np.ndarray, side: float) -> np.ndarray:
+    """Returns the outline of a cube, projected on the vertical plane through the direction `along`; shape (n, 2)."""
     corners = Rotation.from_quat(quaternion).apply(_CORNERS * side) + position
     flat = np.stack([corners[:, :2] @ along, corners[:, 2]], 1)
-    for i, j in _EDGES:
-        axes.plot(*flat[[i, j]].T, color=color, linewidth=0.8)  # type: ignore[attr-defined]
+    return flat[ConvexHull(flat).vertices]
 
 
+@plot_style()
 def push_figure(result: PushResult) -> Figure:
     """Draws the hand's path, its error over time, and the cube's motion."""
     assert result.poses is not None
-    figure = Figure(figsize=(13, 7.5), layout="constrained")
+    figure = Figure(figsize=(10, 6.4), layout="constrained")
     real, simulated, time = mean_poses([run.poses for run in result.runs]), result.poses, times(result.experiment)
     path, error, height, cube = figure.subplots(2, 2).ravel()
-    for run in result.runs:
-        path.plot(run.poses.hand_position[:, 0], run.poses.hand_position[:, 2], color="0.8", linewidth=0.7)
-        distance = np.linalg.norm(run.poses.hand_position - real.hand_position, axis=1) * 1e3
-        error.plot(time, distance, color="0.8", linewidth=0.7)
-        cube.plot(time, run.poses.cube_position[:, 0], color="0.8", linewidth=0.7)
-        height.plot(time, run.poses.hand_position[:, 2], color="0.8", linewidth=0.7)
-    path.plot(real.hand_position[:, 0], real.hand_position[:, 2], color=REAL, label="measured, mean")
-    path.plot(simulated.hand_position[:, 0], simulated.hand_position[:, 2], color=SIMULATED, label="simulated")
-    path.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
-    path.set_title(f"experiment {result.experiment}: path of the hand", loc="left")
-    path.legend()
-    distance = np.linalg.norm(simulated.hand_position - real.hand_position, axis=1) * 1e3
-    error.plot(time, distance, color=SIMULATED, label="simulated")
-    error.plot([], color="0.8", label="each real run")
-    error.set(xlabel="time [s]", ylabel="distance from the mean [mm]", ylim=(0, None))
-    error.set_title("error of the hand", loc="left")
-    error.legend()
-    height.plot(time, real.hand_position[:, 2], color=REAL)
-    height.plot(time, simulated.hand_position[:, 2], color=SIMULATED)
-    height.set(xlabel="time [s]", ylabel="z of the hand [m]")
-    cube.plot(time, real.cube_position[:, 0], color=REAL)
-    cube.plot(time, simulated.cube_position[:, 0], color=SIMULATED)
-    cube.set(xlabel="time [s]", ylabel="x of the cube [m]")
-    for axes in (path, error, height, cube):
-        axes.grid(alpha=0.3)
+    views = [
+        (path, lambda poses: (poses.hand_position[:, 0], poses.hand_position[:, 2])),
+        (error, lambda poses: (time, np.linalg.norm(poses.hand_position - real.hand_position, axis=1) * 1e3)),
+        (height, lambda poses: (time, poses.hand_position[:, 2])),
+        (cube, lambda poses: (time, poses.cube_position[:, 0])),
+    ]
+    for axes, curve in views:
+        for run in result.runs:
+            (each,) = axes.plot(*curve(run.poses), color=EACH_RUN, linewidth=1.2)
+        each.set_label(f"each of {len(result.runs)} measured runs")
+        if axes is not error:
+            axes.plot(*curve(real), color=INK, linewidth=3.5, label="their mean")
+        axes.plot(*curve(simulated), color=SIMULATED, linewidth=1.5, label="simulated")
+    path.set(title="path of the hand", aspect="equal", xlabel="x [m]", ylabel="z [m]")
+    error.set(title="distance of the hand from the measured mean", xlabel="time [s]", ylabel="mm", ylim=(0, None))
+    height.set(title="height of the hand", xlabel="time [s]", ylabel="z [m]")
+    cube.set(title="position of the cube", xlabel="time [s]", ylabel="x [m]")
+    legend_below(figure, path, 3)
     return figure
