@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 import rospy
 import tf2_ros
@@ -13,6 +15,7 @@ from rpbi_examples.shelving import LEFT, RIGHT
 pytestmark = pytest.mark.thorough
 BOXES = ("box_1", "box_2", "box_3")
 SLOW_S = 500.0
+TOO_BUSY = re.compile(r"staleness: the target is|end other programs")
 
 
 def bookcase_of(buffer: tf2_ros.Buffer, box: str) -> str:
@@ -34,7 +37,7 @@ def test_all_boxes_come_into_the_other_bookcase(ros: RosSystem, real_robot: bool
     output = ros.output(process)
     assert {bookcase_of(buffer, box) for box in BOXES} == {RIGHT.name}, output
     assert all(f"{box} is in 'right_shelf'" in output for box in BOXES), output
-    if real is not None and "staleness: the target is" in output:
-        pytest.skip("the real robot has the wall's time, and its guard said that targets came too late for it")
+    if real is not None and "halted" in output and TOO_BUSY.search(output):
+        pytest.skip("the real robot has the wall's time, and the nodes said that the computer was too busy for it")
     if real is not None:
         assert real.has_followed and "halted" not in output, output

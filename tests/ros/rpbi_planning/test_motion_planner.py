@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import rospy
 import yaml
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalID, GoalStatus
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from node_world import add, publishing, remove
 from ros_system import RosSystem, wait_until
@@ -24,7 +24,13 @@ from visualization_msgs.msg import Marker, MarkerArray
 from robot_model.geometry import Pose as RobotPose
 from robot_model.geometry import angle_between
 from ros_pybullet_interface.msg import PybulletObject
-from rpbi_planning.msg import MotionRequest, MoveRobotAction, MoveRobotGoal
+from rpbi_planning.msg import (
+    MotionRequest,
+    MoveRobotAction,
+    MoveRobotActionGoal,
+    MoveRobotActionResult,
+    MoveRobotGoal,
+)
 from rpbi_planning.srv import PlanAndMove, PlanMotion
 
 LINK, NAMES = "panda_grasptarget", [f"panda_joint{i}" for i in range(1, 8)]
@@ -132,6 +138,47 @@ def test_path_and_ghost_are_shown(planner):
     ghosts.wait_for(10)
     shown = {each.id: each.pose.position for each in ghosts.messages[-1].markers}
     assert len(shown) > 8
+
+
+def sent_at(stamp: rospy.Time, goal: MoveRobotGoal) -> MoveRobotActionGoal:
+    """Returns a goal as its message, which a client with simulated time sent at a time.
+
+    Other tests' goals have the wall's time. They have to come later: the server recalls goals older than the last one.
+    """
+    goal_id = GoalID(stamp, f"sent at {stamp.to_sec()}")
+    return MoveRobotActionGoal(Header(stamp=stamp), goal_id, goal)
+
+
+def test_motion_starts_from_joint_states_as_new_as_the_request(planner):
+    """The goal's stamp is ahead of the joint states, as if those were late; until they come, the robot moves."""
+    planner.move_to(READY)
+    results = planner.ros.listen("/planner/move_robot/result", MoveRobotActionResult)
+    sent = planner.states.messages[-1].header.stamp + rospy.Duration(1.5)
+    with (
+        publishing("/planner/move_robot/goal", MoveRobotActionGoal) as goals,
+        publishing("/rpbi/panda/joint_states/target", JointState) as targets,
+    ):
+        goals.publish(sent_at(sent, MoveRobotGoal(MotionRequest(named="ready"))))
+        targets.publish(JointState(name=NAMES[:1], position=[0.3]))
+        wait_until(lambda: planner.joints[0] > 0.28, "it moves away")
+        assert not results.messages
+        results.wait_for(1)
+    assert results.messages[0].result.success, results.messages[0].result.message
+    assert results.messages[0].header.stamp > sent
+    assert planner.joints == pytest.approx(READY, abs=5e-3)
+
+
+@pytest.mark.thorough  # it takes 10 s
+def test_motion_is_refused_if_no_joint_states_are_as_new_as_the_request(planner):
+    results = planner.ros.listen("/planner/move_robot/result", MoveRobotActionResult)
+    planner.ros.call("/rpbi/stop", Trigger)
+    with publishing("/planner/move_robot/goal", MoveRobotActionGoal) as goals:
+        sent = planner.states.messages[-1].header.stamp + rospy.Duration(5.0)
+        goals.publish(sent_at(sent, MoveRobotGoal(MotionRequest(named="ready"))))
+        results.wait_for(1)
+    planner.ros.call("/rpbi/start", Trigger)
+    result = results.messages[0].result
+    assert not result.success and "robot 'panda': expected joint states as new as the request" in result.message
 
 
 def test_cancelled_goal_stops_the_robot(planner):

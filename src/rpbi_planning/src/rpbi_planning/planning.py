@@ -206,7 +206,7 @@ class _Plan:
                 return self._failed("cancelled")
             return self._failed(
                 "no path was found within the time limit: the goal may be enclosed; a longer time limit, another "
-                "planner or less padding may help"
+                f"planner or less padding may help{self._near(model, start)}"
             )
         if shorten_s > 0.0:
             end = time.monotonic() + shorten_s
@@ -289,6 +289,18 @@ class _Plan:
             return f"the start is in collision: {self._collision(model, start)}"
         model.set_paddings(np.minimum(model.padding, np.maximum(distances - LESS_M, 0.0)))
         return ""
+
+    def _near(self, model: CollisionModel, start: Array) -> str:
+        """Names shapes that are nearer than the padding at the start; empty if there are none."""
+        if not model.is_lowered:
+            return ""
+        distances = model.distances(start)
+        pairs = [
+            f"'{a}' and '{b}' are {1e3 * distances[i]:.2f} mm apart"
+            for i in np.argsort(distances)[:3].tolist()
+            for a, b in [(model.shapes[model.first[i]].name, model.shapes[model.second[i]].name)]
+        ]
+        return f"; at the start, {', '.join(pairs)}"
 
     def _collision(self, model: CollisionModel, q: Array) -> str:
         meetings = model.meetings(q)

@@ -117,7 +117,8 @@ class MotionServices:
         def is_cancelled() -> bool:
             return self._is_stopped() or bool(self._action.is_preempt_requested())
 
-        outcome = self._move(goal.request, is_cancelled, self._action.publish_feedback)
+        sent = self._action.current_goal.get_goal_id().stamp
+        outcome = self._move(goal.request, is_cancelled, self._action.publish_feedback, sent)
         result = MoveRobotResult(*outcome)
         if outcome.success:
             self._action.set_succeeded(result, outcome.message)
@@ -264,11 +265,17 @@ class MotionServices:
     # --- Motion
 
     def _move(
-        self, request: MotionRequest, is_cancelled: Callable[[], bool], report: Callable[[Any], None]
+        self,
+        request: MotionRequest,
+        is_cancelled: Callable[[], bool],
+        report: Callable[[Any], None],
+        sent: rospy.Time | None = None,
     ) -> _Outcome:
         try:
             with self._work():
                 report(MoveRobotFeedback(phase=PLANNING))
+                self._topics.wait()
+                self._topics.wait_for(sent or rospy.Time())
                 planned = self._plan(request, is_cancelled, at_present=True)
                 if not planned.result.success:
                     return _Outcome(False, planned.result.message, 1)

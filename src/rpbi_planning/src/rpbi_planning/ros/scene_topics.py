@@ -34,6 +34,8 @@ from rpbi_planning.scene_robot import SceneRobot
 
 FIRST_S, POLL_S = 10.0, 0.05
 """Longest time to wait for the first messages, and time between two looks [s]."""
+ALLOWED_S = 0.1
+"""Largest age of a state relative to a request: time between messages, and difference of two computers' clocks [s]."""
 CONTENTS = ("add", "remove")
 """Commands that change the bodies of a world."""
 
@@ -100,6 +102,34 @@ class SceneTopics:
             with self.lock:
                 if self._scene is not None and self._subscribers.keys() <= self._joints.keys():
                     return
+            time.sleep(POLL_S)
+
+    def wait_for(self, stamp: rospy.Time) -> None:
+        """Waits until the joint states of all robots are as new as a request, at most for `FIRST_S`.
+
+        On a busy computer, messages of the simulator may come later than the request.
+
+        Args:
+            stamp: Time at which the request was sent. A time that is further ahead than `FIRST_S` is of another clock,
+                for example of a client without simulated time, and is ignored.
+
+        Raises:
+            InterfaceError: If they do not come.
+        """
+        end_s = time.monotonic() + FIRST_S
+        while stamp and not rospy.is_shutdown():
+            with self.lock:
+                ages = {
+                    name: (stamp - self._joints[name][0]).to_sec() for name in self._subscribers.keys() & self._joints
+                }
+            oldest = max(ages, key=lambda name: ages[name], default="")
+            if not ages or not ALLOWED_S < ages[oldest] <= FIRST_S:
+                return
+            if time.monotonic() > end_s:
+                raise InterfaceError(
+                    f"robot '{oldest}': expected joint states as new as the request, got states that are "
+                    f"{ages[oldest]:.1f} s older; synchronise the clocks, or end other programs"
+                )
             time.sleep(POLL_S)
 
     def present(self) -> PlanningScene:
