@@ -74,6 +74,7 @@ PICTURES: dict[str, str] = {
     "telepresence.png": "rviz_people:telepresence",
     "tracking.png": "rviz_people:tracking",
     "browser.png": "live_page:draw_browser",
+    "episode.png": "live_page:draw_episode",
     "gym_curve.png": "curves:draw_gym_curve",
     "ik_errors.png": "curves:draw_ik_errors",
     "streams.png": "curves:draw_streams",

@@ -1,4 +1,4 @@
-"""Pictures of the live view in a real browser, by itself and next to RViz."""
+"""Pictures of the live view and of an episode's page in a real browser, by themselves and next to RViz."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import os
 import re
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -24,17 +25,25 @@ from screen import PATIENCE_S, Stage, next_message, wait_until
 
 from ros_pybullet_interface.msg import Contacts, SimulationState
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tests/support/screens"))
+sys.path.append(str(ROOT / "tests/support/screens"))
 from chromium import Tab, browser
 from rviz_worlds import PUSH_N, RVIZ, push_n
 from viewer import Viewer
 
+ROOT = Path(__file__).resolve().parents[2]
 SIZE, FINENESS = (960, 760), 1.5
 """Size of the page in its own pixels, and pixels of the picture for each of them, so that its words are readable."""
 IMAGE = "rpbi/camera/colour/image/compressed"
 CAMERA = "initialCameraPosition=0.75,-1.65,1.1&initialCameraLookAt=0.53,0.0,0.27"
 """Position of the page's camera, and point that it looks at [m]: the arm is to the left of the panel."""
 CLOSE = "[...document.querySelectorAll('[class*=Notification-closeButton]')].map((each) => each.click()).length"
+CONNECTED = "document.body.innerText.includes('Connected')"
+EPISODE_SIZE, PUSHED_S = (960, 760), 10.0
+"""Size of the page of an episode in its own pixels, and time in it at which the arm pushes the box [s]."""
+PLAYED_S = "document.querySelector('#root [role=slider]')?.getAttribute('aria-valuenow')"
+SEEK = """(() => { const input = document.querySelector('#root input[inputmode]');
+Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(input, '%s');
+input.dispatchEvent(new Event('input', { bubbles: true })); })()"""
 LOOKS, LOOKS_S = 3, 2.0
 """Number of equal pictures after which the page has drawn the stopped world, and time between two of them [s]."""
 
@@ -66,7 +75,25 @@ def draw_browser(path: Path) -> None:
         _close_warning(tab)
         next_message("rpbi/box/contacts", Contacts, lambda each: push_n(each) > PUSH_N)
         stage.stop_world()
+        tab.wait(CONNECTED, PATIENCE_S)
         write_png(path, _still_screenshot(tab, Path(folder)))
+
+
+def draw_episode(path: Path) -> None:
+    """The page of a recorded push, while the arm pushes the box."""
+    with tempfile.TemporaryDirectory() as name, browser(*EPISODE_SIZE) as chromium:
+        page, run = Path(name) / "episode.html", [str(ROOT / "rpbi")]
+        subprocess.run([*run, "demo", "--headless", "--seconds", "14", "--out", name], check=True)
+        subprocess.run([*run, "view", f"{name}/recording.bag", "--out", str(page)], check=True)
+        tab = chromium.tab()
+        width, height = EPISODE_SIZE
+        screen = {"width": width, "height": height, "deviceScaleFactor": FINENESS, "mobile": False}
+        tab.call("Emulation.setDeviceMetricsOverride", **screen)
+        tab.open(page.as_uri())
+        tab.wait(PLAYED_S, 120.0)
+        _close_warning(tab)
+        tab.run(SEEK % PUSHED_S)
+        write_png(path, _still_screenshot(tab, Path(name)))
 
 
 def draw_browser_demo(path: Path) -> None:
@@ -151,8 +178,7 @@ def _start_view(stage: Stage, folder: Path) -> str:
 
 
 def _still_screenshot(tab: Tab, folder: Path) -> Image.Image:
-    """Returns a picture of the connected page as soon as it stays the same."""
-    tab.wait("document.body.innerText.includes('Connected')", PATIENCE_S)
+    """Returns a picture of the page as soon as it stays the same."""
     pictures: list[bytes] = []
 
     def is_still() -> bool:

@@ -42,6 +42,8 @@ FLOOR_M, FAR_M = 0.05, 1.5
 """Height up to which points belong to the floor, and largest depth in the picture of the depth image [m]."""
 ANGLE = -1.0
 """Angle of the orbiting camera about the vertical [rad]."""
+ABOVE_BOX_M = 0.13
+"""Height of drawn paths above the hand, so that the box does not hide them [m]."""
 PUSH_N = 5.2
 """Force of the arm on the box at which the demo's picture is taken [N]."""
 
@@ -268,12 +270,15 @@ def dual_iiwa(path: Path) -> None:
 
 
 def lfd_rviz(path: Path) -> None:
-    """The arm repeats a push that it has learned from a demonstration."""
-    view = View((-0.62, 0.17, 0.2), 1.5, 0.95, 3.35)
+    """The arm repeats a push that it has learned from a demonstration; paths are drawn above the box, not in it."""
+    view = View((-0.62, 0.13, 0.15), 1.15, 1.0, 3.35)
     with Stage(1280, 720) as stage, tempfile.TemporaryDirectory() as out:
         stage.launch("lfd.launch", "operator:=scripted", "seed:=3", f"out:={out}", "plot:=false")
-        plan = {"Line Width": 0.01, "Offset": {"X": 0.0, "Y": 0.0, "Z": 0.01}}
-        stage.rviz(RVIZ / "lfd.rviz", {"Demonstration": {"Line Width": 0.01}, "Plan": plan}, **view.of_rviz)
+        above = [
+            {"Line Width": 0.008, "Offset": {"X": 0.0, "Y": 0.0, "Z": z}} for z in (ABOVE_BOX_M, ABOVE_BOX_M + 0.01)
+        ]
+        shown = dict(zip(("Demonstration", "Plan"), above))
+        stage.rviz(RVIZ / "lfd.rviz", shown, **view.of_rviz)
         next_message("lfd/state", String, lambda each: each.data == "executing")
         tf = TfInterface()
 

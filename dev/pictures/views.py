@@ -25,7 +25,7 @@ States: TypeAlias = "dict[str, Any]"
 RVIZ = Path(__file__).resolve().parents[2] / "src/rpbi_examples/rviz"
 PUSHED_CYCLES = 75
 """Cycles of the controller before the picture, so that the box is in the first bend of the S."""
-PUSHING_VIEW = {"Distance": 0.42, "Focal_Point": {"X": 0.30, "Y": -0.19, "Z": 0.77}, "Pitch": 0.95, "Yaw": 0.6}
+PUSHING_VIEW = {"Distance": 0.52, "Focal_Point": {"X": 0.30, "Y": -0.2, "Z": 0.79}, "Pitch": 0.85, "Yaw": 0.6}
 PUSHING_LEGEND = (
     ("#33b24c", "path of the box, and reference"),
     ("#198ce6", "predicted path and outlines of the box"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -171,6 +172,16 @@ def test_commands_are_ordered_a_period_apart_from_the_measured_position(left, ri
 
     wait_until(came_apart, "three periods of 0.2 s lie between the first command and the last")
     assert left.statuses.messages == []
+
+
+def test_no_target_of_a_long_burst_is_dropped(left):
+    """A source or a guard that got no processor time for seconds; a dropped target would make the next one a jump."""
+    path = [0.15 - 0.15 * math.cos(math.pi * k / 250) for k in range(251)]
+    for place in path:
+        left.send(place, 0.0)
+    left.commands.wait_for(len(path))
+    assert [each.position[0] for each in left.commands.messages] == pytest.approx(path)
+    assert not left.violations.messages
 
 
 def test_robot_too_near_to_itself_receives_the_direction_away(module_ros):

@@ -36,7 +36,7 @@ class GuardStation:
         for name, value in {"silence_s": 60.0, **parameters}.items():
             rospy.set_param(f"{namespace}/{NODE}/{name}", value)
         self.process = ros.start(["rosrun", "safe_robot", "safe_robot_node.py", f"__ns:={namespace}"])
-        self._publisher = rospy.Publisher(f"{namespace}/joint_states/target", JointState, queue_size=100)
+        self._publisher = rospy.Publisher(f"{namespace}/joint_states/target", JointState, queue_size=1000)
         kind = JointState if parameters.get("publish_as_joint_state", True) else Float64MultiArray
         self.commands = ros.listen(f"{namespace}/joint_states/command", kind)
         shown = DiagnosticStatus if parameters.get("status_as_diagnostic", False) else Status

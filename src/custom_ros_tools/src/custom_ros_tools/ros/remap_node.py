@@ -21,8 +21,8 @@ Config = TypeVar("Config", bound=RemapConfig)
 
 TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
 TO_JOINT_STATE = "remap_joint_state_to_joint_state"
-QUEUE_SIZE = 100
-"""Queue size of publisher and subscriber, enough for 0.1 s of joint states at 1 kHz on a busy machine."""
+QUEUE_SIZE = 1000
+"""Queue size of publisher and subscriber, enough for 1 s of joint states at 1 kHz on a busy machine."""
 START_WAIT_S = 2.0
 """Longest time to wait for a command and for a state of the robot, each, when the node is switched on [s]."""
 

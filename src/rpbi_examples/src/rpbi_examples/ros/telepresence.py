@@ -129,11 +129,13 @@ class TelepresenceNode:
 
     def _show(self, arm: ArmPosition, force_n: float) -> None:
         self._force_topic.publish(force_n)
-        marker = Marker(type=Marker.TEXT_VIEW_FACING, text=f"{force_n:.1f} N of {self._config.force_limit:g} N")
+        marker = Marker(
+            type=Marker.TEXT_VIEW_FACING, text=f"force {force_n:.1f} N, limit {self._config.force_limit:g} N"
+        )
         marker.header.frame_id, marker.header.stamp = "rpbi/world", rospy.Time.now()
         marker.pose.position = Point(*(arm.elbow + (0.0, 0.0, 0.2)).tolist())
         marker.pose.orientation.w = 1.0
-        marker.scale.z, marker.color.a = 0.06, 1.0
+        marker.scale.z, marker.color.a = 0.05, 1.0
         self._marker.publish(marker)
 
     def _outcome(self) -> Outcome:

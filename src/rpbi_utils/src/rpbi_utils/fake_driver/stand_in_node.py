@@ -23,7 +23,7 @@ from .config import FakeDriverConfig
 from .controller import Reflex, RobotController
 from .measurement import Measurement
 
-QUEUE_SIZE = 100
+QUEUE_SIZE = 1000
 STATE_HZ = 20.0
 """Rate at which an unchanged driver state is published [Hz]. Changes are published at once."""
 

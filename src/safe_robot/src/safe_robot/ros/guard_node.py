@@ -28,8 +28,11 @@ from .measurements import Measurements
 from .parameters import guard_of_parameters
 
 NODE = "robot_safety_node"
-QUEUE_SIZE = 100
-"""Number of messages buffered while the machine is busy; beyond it, the oldest are dropped."""
+QUEUE_SIZE = 1000
+"""Number of messages buffered while the machine is busy; beyond it, the oldest are dropped.
+
+It exceeds the targets of `staleness.timeout_s`: a busy machine leads to a violation of `staleness`, not to a jump.
+"""
 WATCH_HZ = 100.0
 """Rate at which the node checks that targets still arrive [Hz]."""
 JUMP_S = 0.5
