@@ -149,7 +149,7 @@ def sent_at(stamp: rospy.Time, goal: MoveRobotGoal) -> MoveRobotActionGoal:
     return MoveRobotActionGoal(Header(stamp=stamp), goal_id, goal)
 
 
-def test_motion_starts_from_joint_states_as_new_as_the_request(planner):
+def test_motion_starts_from_states_as_new_as_the_request(planner):
     """The goal's stamp is ahead of the joint states, as if those were late; until they come, the robot moves."""
     planner.move_to(READY)
     results = planner.ros.listen("/planner/move_robot/result", MoveRobotActionResult)
@@ -169,7 +169,7 @@ def test_motion_starts_from_joint_states_as_new_as_the_request(planner):
 
 
 @pytest.mark.thorough  # it takes 10 s
-def test_motion_is_refused_if_no_joint_states_are_as_new_as_the_request(planner):
+def test_motion_is_refused_if_all_states_are_older(planner):
     results = planner.ros.listen("/planner/move_robot/result", MoveRobotActionResult)
     planner.ros.call("/rpbi/stop", Trigger)
     with publishing("/planner/move_robot/goal", MoveRobotActionGoal) as goals:
