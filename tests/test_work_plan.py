@@ -45,7 +45,7 @@ def run_suite(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     (folder / "test_suite.py").write_text(SUITE)
     (folder / "pytest.ini").write_text(
         f"[pytest]\npythonpath = {SUPPORT}\naddopts = -p work_plan -p second_try -p no:cacheprovider\n"
-        "markers =\n    quick\n    thorough\n"
+        "markers =\n    quick\n    thorough\n    alone\n"
     )
     environment = os.environ | {"PYTHONPATH": f"{SUPPORT}:{os.environ.get('PYTHONPATH', '')}"}
     command = [sys.executable, "-m", "pytest", "-v", "-n1", *words]
@@ -84,3 +84,34 @@ def test_a_failed_thorough_test_is_run_again(tmp_path):
     done = run_suite(tmp_path, "--all")
     assert done.returncode == 0, done.stdout
     assert "5 passed, 1 flaky" in done.stdout
+
+
+TIMED = """
+import pathlib, time, pytest
+
+@pytest.mark.{mark}
+@pytest.mark.parametrize("number", range(4))
+def test_timed(number):
+    began_s = time.monotonic()
+    time.sleep(0.3)
+    pathlib.Path(__file__).with_suffix(f".{{number}}").write_text(f"{{began_s}} {{time.monotonic()}}")
+"""
+
+
+@pytest.mark.parametrize("mark", ["alone", "quick"])
+def test_nothing_else_runs_beside_a_test_with_the_mark_alone(tmp_path, mark):
+    """With another mark, tests of the two workers overlap."""
+    (tmp_path / "test_marked.py").write_text(TIMED.format(mark=mark))
+    (tmp_path / "test_other.py").write_text(TIMED.format(mark="quick"))
+    done = run_suite(tmp_path, "-n2", "test_marked.py", "test_other.py")
+    assert "8 passed" in done.stdout, done.stdout
+    marked, others = (
+        [tuple(map(float, (tmp_path / f"{name}.{number}").read_text().split())) for number in range(4)]
+        for name in ("test_marked", "test_other")
+    )
+    overlaps = sum(
+        begin < end_of_other and begin_of_other < end
+        for begin, end in marked
+        for begin_of_other, end_of_other in others
+    )
+    assert (overlaps == 0) == (mark == "alone")

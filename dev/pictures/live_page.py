@@ -25,12 +25,12 @@ from screen import PATIENCE_S, Stage, next_message, wait_until
 
 from ros_pybullet_interface.msg import Contacts, SimulationState
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tests/support/screens"))
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests/support/screens"))
 from chromium import Tab, browser
 from rviz_worlds import PUSH_N, RVIZ, push_n
 from viewer import Viewer
 
+ROOT = Path(__file__).resolve().parents[2]
 SIZE, FINENESS = (960, 760), 1.5
 """Size of the page in its own pixels, and pixels of the picture for each of them, so that its words are readable."""
 IMAGE = "rpbi/camera/colour/image/compressed"

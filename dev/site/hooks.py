@@ -60,6 +60,8 @@ def on_files(files: Files, config: Any) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
     """Applies `extra.search`, replaces texts and targets of links, and removes the marks of blocks."""
+    if page.is_homepage:
+        page.meta["hide"] = ["toc"]  # cards need the space; front matter would be seen on repository hosts
     search = config.extra["search"]
     page.meta["search"] = {"boost": search["boost"].get(page.file.src_uri, 1)}
     page.meta["tags"] = search["words"].get(page.file.src_uri, [])

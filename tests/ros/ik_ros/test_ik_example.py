@@ -29,7 +29,7 @@ def poses(listener, frame):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("solver", [LEADING, *MORE_SOLVERS])
+@pytest.mark.parametrize("solver", [pytest.param(LEADING, marks=pytest.mark.alone), *MORE_SOLVERS])
 def test_arm_tracks_the_figure(ros, solver):
     moving, still = ros.listen("/tf", TFMessage), ros.listen("/tf_static", TFMessage)
     real = RealRobot(ros) if solver == LEADING else None

@@ -128,6 +128,7 @@ def test_a_device_demonstrates_in_the_plane(ros, tmp_path, device):
     assert recorded[f"buttons/{stick.button}"].any() and recorded["axes/0"].any()
 
 
+@pytest.mark.alone
 @pytest.mark.thorough
 @pytest.mark.parametrize("guard", [True, False])
 def test_real_robot_follows_until_it_feels_more_than_it_may(ros, tmp_path, guard):

@@ -12,7 +12,7 @@ from ros_system import RosSystem, wait_until
 
 from rpbi_examples.shelving import LEFT, RIGHT
 
-pytestmark = pytest.mark.thorough
+pytestmark = [pytest.mark.thorough, pytest.mark.alone]
 BOXES = ("box_1", "box_2", "box_3")
 SLOW_S = 500.0
 TOO_BUSY = re.compile(r"staleness: the target is|end other programs")

@@ -27,6 +27,7 @@ JOINT = "lwr_arm_0_joint"
 SLOW_S = 120.0
 
 
+@pytest.mark.alone
 @pytest.mark.thorough
 @pytest.mark.parametrize("example", ["human_interaction", "teleop"])
 def test_an_example_leads_a_real_robot(ros: RosSystem, example: str, tmp_path: Path) -> None:

@@ -106,6 +106,7 @@ def test_two_guarded_hands_draw_mirrored_circles(ros, position):
     wait_until(met, "targets that cross the arms are not safe")
 
 
+@pytest.mark.alone
 @pytest.mark.thorough
 def test_panda_works_with_ros_tools_and_leads_a_real_one(ros, position):
     real = RealRobot(ros)

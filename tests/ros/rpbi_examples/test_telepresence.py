@@ -67,6 +67,7 @@ def test_person_is_dressed_from_suit_datagrams_to_the_outcome(ros, tmp_path):
     assert "Traceback" not in ros.output(process)
 
 
+@pytest.mark.alone
 @pytest.mark.thorough
 @pytest.mark.parametrize("guard", [True, False])
 def test_guard_keeps_the_real_robot_off_live_bodies(ros, guard):

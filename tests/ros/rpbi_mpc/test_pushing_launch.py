@@ -89,6 +89,7 @@ def test_hand_pushes_by_single_steps_and_to_the_paths_end(ros: RosSystem, tmp_pa
     check_display(*shown)
 
 
+@pytest.mark.alone
 @pytest.mark.thorough
 def test_guarded_real_robot_pushes_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:
     driver = ros.listen("/stand_in/driver_state", DriverState)

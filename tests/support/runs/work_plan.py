@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import faulthandler
+import fcntl
 import os
-from collections.abc import Generator
+import shutil
+import tempfile
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -85,17 +89,46 @@ STDERR = pytest.StashKey[int]()
 """Where the stacks of a stuck worker go."""
 
 
+LOCKS = pytest.StashKey[Path]()
+"""Folder of the locks that all workers of a run share."""
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """Keeps a way out to the terminal that no test captures."""
+    """Keeps a way out to the terminal that no test captures, and the folder of the locks."""
     config.stash[STDERR] = os.dup(2)
+    shared = getattr(config, "workerinput", {}).get("locks")
+    config.stash[LOCKS] = Path(shared or tempfile.mkdtemp(prefix="rpbi-tests-"))
 
 
-@pytest.hookimpl(hookwrapper=True)
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tells a worker the folder of the locks."""
+    node.workerinput["locks"] = str(node.config.stash[LOCKS])
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Removes the folder of the locks after all workers have ended."""
+    if not hasattr(config, "workerinput"):
+        shutil.rmtree(config.stash[LOCKS], ignore_errors=True)
+
+
+@pytest.hookimpl(hookwrapper=True, tryfirst=True)  # the time-out begins after the wait
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, None, None]:
-    """Has a run that is stuck end with where, instead of never."""
-    faulthandler.dump_traceback_later(STUCK_S, exit=True, file=item.config.stash[STDERR])
-    yield
-    faulthandler.cancel_dump_traceback_later()
+    """Runs a test with the mark `alone` while no other worker runs one; has a stuck run end with where."""
+    with _turn(item.config.stash[LOCKS], fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH):
+        faulthandler.dump_traceback_later(STUCK_S, exit=True, file=item.config.stash[STDERR])
+        yield
+        faulthandler.cancel_dump_traceback_later()
+
+
+@contextmanager
+def _turn(folder: Path, kind: int) -> Iterator[None]:
+    """Waits for a lock, behind all workers that wait already, and holds it during a `with` block."""
+    with (folder / "queue").open("w") as queue, (folder / "run").open("w") as run:
+        fcntl.flock(queue, fcntl.LOCK_EX)  # without it, tests that share the lock would keep an exclusive one waiting
+        fcntl.flock(run, kind)
+        fcntl.flock(queue, fcntl.LOCK_UN)
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

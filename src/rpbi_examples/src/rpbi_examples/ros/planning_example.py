@@ -25,8 +25,8 @@ WORLD = "rpbi/world"
 FINGER = "panda_finger_joint1"
 FINGERS_S = 1.0
 """Duration of a motion of the fingers [s of ROS time]."""
-TRIES = 3
-"""Largest number of requests for a motion."""
+TRIES, PAUSE_S = 5, 2.0
+"""Largest number of requests for a motion, and time between two of them [s of ROS time]."""
 
 
 def planning_example() -> None:
@@ -79,6 +79,7 @@ def _move(planner: ActionClient, box: str, step: Step) -> None:
         if rospy.is_shutdown():
             raise rospy.ROSInterruptException("ROS shuts down")
         rospy.logwarn("%s: %s", box, result.message if result else "no result")
+        rospy.sleep(PAUSE_S)
     raise InterfaceError(f"{box}: the hand cannot move to {step.pose}")
 
 
