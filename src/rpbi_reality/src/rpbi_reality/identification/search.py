@@ -8,14 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import qmc
 
 from custom_ros_tools.errors import InterfaceError, MissingDependency
 
-from .evaluator import Evaluates
+from .evaluator import Evaluates, Evaluation
 from .fit_config import FitConfig, ParameterConfig
 
 DIFFERENCE = 0.01
 """Step of finite differences, as a fraction of the bounds."""
+STARTS = 4
+"""Number of values at which a search by least squares begins."""
+SOFT = 0.5
+"""Residual beyond which the loss of least squares grows linearly, in standard deviations."""
 NO_EFFECT = 1e-9
 """Largest change of all errors at which nothing depends on a parameter."""
 
@@ -116,51 +121,90 @@ def _refuse_without_effect(config: FitConfig, space: ParameterSpace, evaluate: E
 def _least_squares(
     config: FitConfig, space: ParameterSpace, evaluate: Evaluates, runs: Sequence[int], report: Callable[[str], None]
 ) -> Found:
-    """Trust region reflective (Branch, Coleman and Li 1999) with the loss soft L1 over all residuals."""
-    count = len(space.names)
-    last: dict[str, list[np.ndarray]] = {}
+    """Trust region reflective (Branch, Coleman and Li 1999) with the loss soft L1 over all residuals.
 
-    def rows(unit: np.ndarray) -> np.ndarray:
-        evaluation = evaluate([space.values(unit)], runs)[0]
-        report(f"{evaluate.count} candidates, error {math.sqrt(evaluation.runs.mean()):.4g} sigma")
-        last["residuals"] = evaluation.residuals
-        return np.concatenate([*evaluation.residuals, space.prior(space.values(unit))])
+    Contacts make the errors jump at some values of a parameter, and a search can end at such a jump. Short searches
+    therefore begin at several values, each with another part of the runs. The search in all runs begins at the best
+    result.
+    """
+    starts = [space.first, *qmc.Halton(len(space.names), seed=config.seed).random(STARTS - 1)]
+    share = (config.evaluations - STARTS) // 2
+    ends = [
+        _Descent(space, evaluate, runs[i::STARTS] or runs, report).run(start, share // STARTS)
+        for i, start in enumerate(starts)
+    ]
+    costs = [_robust(each, space, end) for each, end in zip(evaluate([space.values(x) for x in ends], runs), ends)]
+    descent = _Descent(space, evaluate, runs, report)
+    unit = descent.run(ends[int(np.argmin(costs))], share)
+    descent.rows(unit)
+    descent.jacobian(unit, counts_jumps=False)  # for the uncertainty
+    empty = np.zeros((0, len(space.names))), np.zeros((0, len(runs)))
+    return Found(unit, *empty, descent.residuals, descent.jacobians)
 
-    def jacobian(unit: np.ndarray, counts_jumps: bool = True) -> np.ndarray:
+
+def _robust(evaluation: Evaluation, space: ParameterSpace, unit: np.ndarray) -> float:
+    """Returns the loss soft L1 of an evaluation, and of the priors."""
+    rows = np.concatenate([*evaluation.residuals, space.prior(space.values(unit))])
+    return float((np.sqrt(1.0 + (rows / SOFT) ** 2) - 1.0).sum())
+
+
+class _Descent:
+    """One search by least squares, in some of the runs."""
+
+    def __init__(
+        self,
+        space: ParameterSpace,
+        evaluate: Evaluates,
+        runs: Sequence[int],
+        report: Callable[[str], None],
+    ) -> None:
+        self._space, self._evaluate, self._runs, self._report = space, evaluate, runs, report
+        self.residuals: list[np.ndarray] = []
+        self.jacobians: list[np.ndarray] = []
+
+    def run(self, unit: np.ndarray, evaluations: int) -> np.ndarray:
+        """Returns the coordinates with the smallest loss that are found from a start."""
+        solved = least_squares(
+            self.rows,
+            np.clip(unit, 1e-3, 1.0 - 1e-3),
+            self.jacobian,
+            (0.0, 1.0),
+            loss="soft_l1",
+            f_scale=SOFT,
+            max_nfev=max(3, evaluations // (2 * len(unit) + 1)),
+            x_scale="jac",
+            xtol=1e-6,
+            ftol=1e-6,
+        )
+        return np.array(solved.x)
+
+    def rows(self, unit: np.ndarray) -> np.ndarray:
+        """Returns all residuals."""
+        evaluation = self._evaluate([self._space.values(unit)], self._runs)[0]
+        error = math.sqrt(evaluation.runs.mean())
+        self._report(f"{self._evaluate.count} candidates, error {error:.4g} sigma")
+        self.residuals = evaluation.residuals
+        return np.concatenate([*evaluation.residuals, self._space.prior(self._space.values(unit))])
+
+    def jacobian(self, unit: np.ndarray, counts_jumps: bool = True) -> np.ndarray:
         """Central differences, one-sided at the bounds; see `slopes` for differences that do not count jumps."""
+        space, count = self._space, len(unit)
         low = np.maximum(unit - DIFFERENCE, 0.0)
         high = np.minimum(unit + DIFFERENCE, 1.0)
         steps = [np.where(np.arange(count) == i, side, unit) for i in range(count) for side in (low, high)]
-        found = evaluate([space.values(each) for each in steps], runs)
+        found = self._evaluate([space.values(each) for each in steps], self._runs)
         columns, priors = [], []
         for i in range(count):
             before, after = found[2 * i], found[2 * i + 1]
-            each = zip(before.residuals, last["residuals"], after.residuals)
+            each = zip(before.residuals, self.residuals, after.residuals)
             if counts_jumps:
                 columns.append([(b - a) / (high[i] - low[i]) for a, _, b in each])
             else:
-                columns.append([slopes(*rows_, unit[i] - low[i], high[i] - unit[i]) for rows_ in each])
+                columns.append([slopes(*rows, unit[i] - low[i], high[i] - unit[i]) for rows in each])
             before_prior, after_prior = (space.prior(space.values(steps[2 * i + side])) for side in (0, 1))
             priors.append((after_prior - before_prior) / (high[i] - low[i]))
-        last["jacobians"] = [np.stack([column[run] for column in columns], 1) for run in range(len(runs))]
-        return np.vstack([*last["jacobians"], np.stack(priors, 1)])
-
-    most = max(3, config.evaluations // (2 * count + 1))
-    solved = least_squares(
-        rows,
-        np.clip(space.first, 1e-3, 1.0 - 1e-3),
-        jacobian,
-        (0.0, 1.0),
-        loss="soft_l1",
-        f_scale=0.5,
-        max_nfev=most,
-        x_scale="jac",
-        xtol=1e-6,
-        ftol=1e-6,
-    )
-    rows(solved.x)
-    jacobian(solved.x, counts_jumps=False)  # for the uncertainty
-    return Found(solved.x, np.zeros((0, count)), np.zeros((0, len(runs))), last["residuals"], last["jacobians"])
+        self.jacobians = [np.stack([column[run] for column in columns], 1) for run in range(len(self._runs))]
+        return np.vstack([*self.jacobians, np.stack(priors, 1)])
 
 
 def slopes(before: np.ndarray, here: np.ndarray, after: np.ndarray, back: float, ahead: float) -> np.ndarray:
