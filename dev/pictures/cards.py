@@ -33,7 +33,7 @@ PARTS = {
     "card_tutorial.png": Part("tutorial_rviz.png", (0.52, 0.44), 0.74),
     "card_guard.png": Part("guard_rviz.png", (0.45, 0.38), 0.8),
     "card_people.png": Part("avatar_walking.png", (0.76, 0.33), 0.46),
-    "card_planning.png": Part("planning.png", (0.53, 0.4), 0.44),
+    "card_planning.png": Part("planning.png", (0.51, 0.41), 0.4),
     "card_data.png": Part("clutter_labels.png", (0.36, 0.5), 0.66),
     "card_learning.png": Part("scene_cup.gif", (0.5, 0.5), 0.9, frame=22),
     "card_reality.png": Part("reality_tosses.png", (0.315, 0.155), 0.23),

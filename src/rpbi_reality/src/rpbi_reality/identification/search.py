@@ -125,17 +125,23 @@ def _least_squares(
 
     Contacts make the errors jump at some values of a parameter, and a search can end at such a jump. Short searches
     therefore begin at several values, each with another part of the runs. The search in all runs begins at the best
-    result.
+    result; from its end, searches in each half of the runs look for a way on.
     """
     starts = [space.first, *qmc.Halton(len(space.names), seed=config.seed).random(STARTS - 1)]
-    share = (config.evaluations - STARTS) // 2
-    ends = [
-        _Descent(space, evaluate, runs[i::STARTS] or runs, report).run(start, share // STARTS)
-        for i, start in enumerate(starts)
-    ]
-    costs = [_robust(each, space, end) for each, end in zip(evaluate([space.values(x) for x in ends], runs), ends)]
+    share = (config.evaluations - 2 * STARTS) // 3
     descent = _Descent(space, evaluate, runs, report)
-    unit = descent.run(ends[int(np.argmin(costs))], share)
+
+    def best(begins: Sequence[np.ndarray], parts: int, known: Sequence[np.ndarray] = ()) -> np.ndarray:
+        """Searches from each of the begins in another part of the runs; returns the best end, or known coordinates."""
+        each = [_Descent(space, evaluate, runs[i::parts] or runs, report) for i in range(parts)]
+        ends = [*known, *(part.run(begin, share // parts) for part, begin in zip(each, begins))]
+        costs = [_robust(found, space, x) for found, x in zip(evaluate([space.values(x) for x in ends], runs), ends)]
+        return ends[int(np.argmin(costs))]
+
+    unit = descent.run(best(starts, STARTS), share)
+    other = best([unit, unit], 2, known=[unit])
+    if other is not unit:
+        unit = descent.run(other, share)
     descent.rows(unit)
     descent.jacobian(unit, counts_jumps=False)  # for the uncertainty
     empty = np.zeros((0, len(space.names))), np.zeros((0, len(runs)))
