@@ -35,9 +35,9 @@ PARTS = {
     "card_people.png": Part("avatar_walking.png", (0.76, 0.33), 0.46),
     "card_planning.png": Part("planning.png", (0.51, 0.41), 0.4),
     "card_data.png": Part("clutter_labels.png", (0.36, 0.5), 0.66),
-    "card_learning.png": Part("scene_cup.gif", (0.5, 0.5), 0.9, frame=22),
+    "card_learning.png": Part("scene_cup.gif", (0.6, 0.3), 0.78, frame=48),
     "card_reality.png": Part("reality_tosses.png", (0.315, 0.155), 0.23),
-    "card_viewers.png": Part("browser_talos.png", (0.745, 0.45), 0.48),
+    "card_viewers.png": Part("browser.png", (0.5, 0.36), 1.0),
 }
 """The parts, indexed by the name of the card's picture."""
 

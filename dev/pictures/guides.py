@@ -42,8 +42,8 @@ FINGERTIPS_M, CLOSES_S = 0.105, 0.4
 """Distance of the point between the fingertips from the hand's frame [m], and time for closing the fingers [s]."""
 GRIP_METRES_A_NEWTON = 0.004
 """Length of the arrows at the fingers [m/N]."""
-POSTURE = (0.3, 0.6, 0.0, -1.2, 0.0, 0.9, 0.0)
-"""Joint positions of the arm whose frames are drawn [rad]."""
+POSTURE = (0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)
+"""Joint positions of the arm whose frames are drawn, those of docs/robot_model.md [rad]."""
 ABOVE_M = 1.25
 """Height of the cube in the first picture of the soft body [m]."""
 CARRIED_S = 2.6
@@ -199,10 +199,10 @@ def draw_robot_model(path: Path) -> None:
     frames = robot.frames.of_links(np.array([POSTURE]))[0]
     hand = frames[robot.frames.links.index("lwr_arm_7_link")]
     x, y, z = hand[:3, 3]
-    words = f"lwr_arm_7_link: x {x:.3f}, y {y:.3f}, z {z:.3f} m in the base"
+    words = f"lwr_arm_7_link: x {x:.3f}, y {y:.3f}, z {z:.3f} m in the root's frame"
     view.pointer(tuple((base @ hand)[:3, 3]), words, (-432, -130))
     root = frames[robot.frames.links.index("lwr_arm_0_link")]
-    view.pointer(tuple((base @ root)[:3, 3]), "lwr_arm_0_link: the base", (80, 75))
+    view.pointer(tuple((base @ root)[:3, 3]), "base, the root link", (80, 75))
     for name, frame in zip(robot.frames.links, frames):
         if name.startswith("lwr_arm_") and name[-6].isdigit():
             matrix = base @ frame

@@ -133,6 +133,7 @@ def test_nor_in_scenes_whose_robots_move(name):
         after, *_ = env.step(np.ones(env.action_space.shape, np.float32))
     for robot in env.task._kind.watch.robots:
         assert np.abs(after[f"{robot}/joints"] - before[f"{robot}/joints"]).max() > 0.003
+    assert env.task.max_actions * env.task.period_s == pytest.approx(env.task._kind.longest_s, abs=0.02)
     env.close()
 
 

@@ -122,7 +122,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         observation = self._line.run(action, self._task.act, self._step, self._observe)
         reward, has_succeeded = self._task.reward(), self._task.has_succeeded()
         has_ended = self._task.has_ended() if self._task.ends_otherwise else has_succeeded
-        is_last = self._task.count >= self.task.config.max_actions
+        is_last = self._task.count >= self.task.max_actions
         if self.render_mode == "human":
             self.render()
         return observation, reward, has_ended, is_last, {"is_success": has_succeeded}

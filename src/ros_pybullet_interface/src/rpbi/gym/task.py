@@ -56,6 +56,11 @@ class WorldTask(ABC):
         """Duration of an action [s]."""
         return float(self.config.action_ticks * self.world.clock.dt_s)
 
+    @property
+    def max_actions(self) -> int:
+        """Number of actions after which an episode is truncated."""
+        return int(self.config.max_actions)
+
     # --- Spaces
 
     @abstractmethod

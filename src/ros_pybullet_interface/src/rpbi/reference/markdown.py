@@ -12,15 +12,16 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([*lines, *map(_row, rows)])
 
 
-def link(title: str, page: str = "") -> str:
+def link(title: str, page: str = "", words: str = "") -> str:
     """Returns a link to a heading.
 
     Args:
         title: The heading.
         page: File of the page with the heading; empty if the link is on the same page.
+        words: Text of the link; by default the heading.
     """
     anchor = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
-    return f"[{title}]({page}#{anchor})"
+    return f"[{words or title}]({page}#{anchor})"
 
 
 def code(text: str) -> str:

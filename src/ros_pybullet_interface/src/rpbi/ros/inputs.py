@@ -87,7 +87,8 @@ TOPIC_INPUTS: dict[str, Topic] = {
         "rpbi/{name}/external_wrench",
         WrenchStamped,
         _external_wrench,
-        "Force [N] and torque [N m] on the link of the frame, in its axes, for 0.5 s; without a frame in the world's.",
+        "Force [N] and torque [N m] on the link `frame_id`, in its axes, for 0.5 s; if it is empty, on the root link, "
+        "in the world's axes.",
     ),
 }
 """Topics of the inputs of bodies, indexed by the name of the input."""

@@ -27,24 +27,24 @@ for your own world.
 
 - `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link, `CONTROLLER` for
   that of a [controller](controllers.md) in a robot's YAML.
-- Names without `/` in front are relative: a namespace moves them.
-- All that is of one tick has that tick's stamp. Rates are in the world's time unless they are said to be in wall time.
-- Keys such as `broadcast_hz` set the rate or open the topic; they are in [config_reference.md](config_reference.md).
+- Names without `/` in front are relative: they are resolved in the namespace of the node.
+- All messages of one tick have the stamp of this tick. Rates are in simulated time, unless wall time is stated.
+- Keys such as `broadcast_hz` set the rate of a topic or enable the topic, see [the reference](config_reference.md).
 - A message that has NaN, an unknown joint or the wrong number of values changes nothing and is logged. A
   service that refuses a request answers `success: false` and the reason."""
 WINDOW = """\
 With `connection_mode: GUI`, see [windows.md](windows.md#pybullets-own-window). Without a window nothing is published,
 and changes of the view are refused."""
 OBJECTS = """\
-The column *of* names types of objects, see [concepts.md](concepts.md#bodies-and-sensors). Objects of your own types and
-your own sensors also have those that their classes name, see [extending.md](extending.md)."""
+The column *of* names types of objects, see [concepts.md](concepts.md#bodies-and-sensors). Your own
+objects and sensors also have the topics and services that their classes declare, see [extending.md](extending.md)."""
 CAMERAS = """\
 `camera` is the first camera, whatever its name; further ones have `rpbi/NAME/...`. A separate node publishes them,
 with the name of the simulator and `_camera`. Images without subscribers are not drawn. The rate is `hz` of the
 camera, see [cameras.md](cameras.md)."""
 FOLLOWED = """\
-All have the prefix `tf_prefix` of the main file, if there is one, as have the frames under `poses`. The node listens to
-TF where `object_tf` names a frame that a body or camera follows."""
+If the main file sets `tf_prefix`, these frames and those under `poses` have that prefix. The node listens to TF for
+frames that `object_tf` names, which a body or camera follows."""
 OTHERS = """\
 The nodes of custom_ros_tools, which remap joint states and publish transforms and markers, are in
 [custom_ros_tools.md](custom_ros_tools.md#nodes). The commands of rpbi_utils have no topics of their own, see
@@ -85,9 +85,9 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
     parts += ["## Cameras", CAMERAS, *_tables({each: [""] for each in of_cameras}, definitions)]
     parts += ["## PyBullet's window", WINDOW, *_tables(of_window, definitions)]
     parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES.items())), FOLLOWED]
-    parts += ["## Parameters", _parameters(), "## Other nodes", OTHERS, "## Messages and services of ours"]
+    parts += ["## Parameters", _parameters(), "## Other nodes", OTHERS, "## Message and service definitions"]
     for name, text in definitions.items():
-        parts += [f"### {name}", block("text", text)]
+        parts += [f"### {_short(name)}", block("text", text)]
     return page(parts)
 
 
@@ -132,7 +132,13 @@ def _tables(owners: Mapping[Endpoint, list[str]], definitions: Mapping[str, str]
 
 
 def _cells(row: Endpoint, definitions: Mapping[str, str]) -> tuple[str, str, str]:
-    return code(row.name), link(row.type) if row.type in definitions else row.type, row.meaning
+    kind = link(_short(row.type), words=row.type) if row.type in definitions else row.type
+    return code(row.name), kind, row.meaning
+
+
+def _short(kind: str) -> str:
+    """Returns the heading of a type: its name, with the package if that is another one."""
+    return kind.removeprefix("ros_pybullet_interface/")
 
 
 def _names(kinds: list[str]) -> str:

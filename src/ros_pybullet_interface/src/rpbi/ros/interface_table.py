@@ -49,11 +49,15 @@ class NodeParameter(NamedTuple):
 
 
 PARAMETERS = (
-    NodeParameter("~config_file", False, "The main YAML file; a relative path is looked for in `~working_directory`."),
+    NodeParameter(
+        "~config_file", False, "The main YAML file; a relative path is resolved against `~working_directory`."
+    ),
     NodeParameter("~working_directory", False, "Folder that a relative `~config_file` is in."),
     NodeParameter("~state_folder", False, "Folder of `rpbi/save` and `rpbi/restore`; the user's home by default."),
     NodeParameter(
-        "~max_predicted_ticks", False, "Most ticks of all candidates of a `rpbi/predict`; 1,000,000 by default."
+        "~max_predicted_ticks",
+        False,
+        "Largest number of ticks of a request of `rpbi/predict`, over all candidates; default: 1,000,000.",
     ),
     NodeParameter(
         "~real_time_priority",
@@ -63,7 +67,7 @@ PARAMETERS = (
     NodeParameter(
         "~config",
         False,
-        "The main YAML file as a mapping, or with `~config_file` the keys that differ; one of both is required.",
+        "The main YAML file as a mapping; with `~config_file`, keys that replace those of the file. One is required.",
     ),
     NodeParameter(
         "use_sim_time", False, "Whether stamps are the world's time, else wall time; from here or a namespace above."

@@ -14,5 +14,5 @@ SCENE_ENVIRONMENTS = {f"rpbi/{''.join(map(str.capitalize, name.split('_')))}-v0"
 for _id, _folder in ENVIRONMENTS.items():
     register(_id, f"{FOLDER}/{_folder}/world.yaml", f"{FOLDER}/{_folder}/task.yaml")
 for _id, _scene in SCENE_ENVIRONMENTS.items():
-    _task = {"type": "rpbi_examples.scenes.task:SceneTask", "scene": _scene, "action_ticks": 20, "max_actions": 1500}
+    _task = {"type": "rpbi_examples.scenes.task:SceneTask", "scene": _scene, "action_ticks": 20}
     register(_id, f"{{rpbi_examples}}/configs/{_scene}/config.yaml", _task)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -77,6 +78,13 @@ class SceneTask(WorldTask):
         self._start_tick = 0
         self._beside: Iterator[None] | None = None
         self._has_failed = False
+
+    @property
+    def max_actions(self) -> int:
+        """Number of actions after which an episode is truncated: by default those of the scene's longest duration."""
+        if "max_actions" in self.config.model_fields_set:
+            return int(self.config.max_actions)
+        return math.ceil(self._kind.longest_s / self.period_s)
 
     def actions(self) -> Sequence[ActionPart]:
         """Returns the parts of the action: a hand motion for each entry of `Scene.hands`, and joint motions for each

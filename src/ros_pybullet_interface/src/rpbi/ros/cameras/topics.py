@@ -20,7 +20,7 @@ IMAGE_TOPICS = (
         Topic(
             "rpbi/{name}/colour/image/compressed",  # by the rule of image_transport
             CompressedImage,
-            meaning="Colour as JPEG, some 3 % of the bytes, for networks.",
+            meaning="Colour as JPEG for networks, with about 2 % of the bytes.",
         ),
     ),
     (
@@ -28,7 +28,7 @@ IMAGE_TOPICS = (
         Topic(
             "rpbi/{name}/depth/image",
             Image,
-            meaning="Distance along the optical axis, `32FC1` [m]; the far end of `range` where nothing is.",
+            meaning="Distance along the optical axis, `32FC1` [m]; the far limit of `range` where there is no body.",
         ),
     ),
     (
@@ -36,7 +36,7 @@ IMAGE_TOPICS = (
         Topic(
             "rpbi/{name}/segmentation",
             Image,
-            meaning="PyBullet's ids of the bodies, `mono16`; 65535 where nothing is.",
+            meaning="PyBullet's ids of the bodies, `mono16`; 65535 where there is no body.",
         ),
     ),
     ("info", Topic("rpbi/{name}/colour/camera_info", CameraInfo, meaning="Intrinsics of the colour image.")),
@@ -50,7 +50,7 @@ CLOUD_TOPIC = (
     Topic(
         "rpbi/{name}/pointcloud",
         PointCloud2,
-        meaning="Points `x`, `y`, `z` [m] in the optical frame and `rgb`, one a pixel, NaN where nothing is; "
+        meaning="Points `x`, `y`, `z` [m] in the optical frame and `rgb`, one per pixel, NaN where there is no body; "
         "with `pointcloud`.",
     ),
 )
