@@ -200,7 +200,7 @@ def draw_robot_model(path: Path) -> None:
     hand = frames[robot.frames.links.index("lwr_arm_7_link")]
     x, y, z = hand[:3, 3]
     words = f"lwr_arm_7_link: x {x:.3f}, y {y:.3f}, z {z:.3f} m in the root's frame"
-    view.pointer(tuple((base @ hand)[:3, 3]), words, (-432, -130))
+    view.pointer(tuple((base @ hand)[:3, 3]), words, (-340, -150))
     root = frames[robot.frames.links.index("lwr_arm_0_link")]
     view.pointer(tuple((base @ root)[:3, 3]), "base, the root link", (80, 75))
     for name, frame in zip(robot.frames.links, frames):

@@ -15,8 +15,8 @@ from custom_ros_tools.errors import InterfaceError, MissingDependency
 from .evaluator import Evaluates, Evaluation
 from .fit_config import FitConfig, ParameterConfig
 
-DIFFERENCE = 0.01
-"""Step of finite differences, as a fraction of the bounds."""
+DIFFERENCES = (0.1, 0.03, 0.01)
+"""Steps of finite differences, as fractions of the bounds: at first, in between, and at the end of a search."""
 STARTS = 4
 """Number of values at which a search by least squares begins."""
 SOFT = 0.5
@@ -123,25 +123,30 @@ def _least_squares(
 ) -> Found:
     """Trust region reflective (Branch, Coleman and Li 1999) with the loss soft L1 over all residuals.
 
-    Contacts make the errors jump at some values of a parameter, and a search can end at such a jump. Short searches
-    therefore begin at several values, each with another part of the runs. The search in all runs begins at the best
-    result; from its end, searches in each half of the runs look for a way on.
+    Contacts make the errors jump at some values of a parameter, and a search can end at such a jump. Therefore:
+
+    - Short searches begin at several values, each with another part of the runs. The best of their results goes on.
+    - The differences for the derivatives are large at first, so that they reach over jumps, and become smaller
+      (implicit filtering, Kelley 2011).
+    - From the end, searches in each half of the runs, which jump elsewhere, look for a way on.
     """
     starts = [space.first, *qmc.Halton(len(space.names), seed=config.seed).random(STARTS - 1)]
-    share = (config.evaluations - 2 * STARTS) // 3
-    descent = _Descent(space, evaluate, runs, report)
 
-    def best(begins: Sequence[np.ndarray], parts: int, known: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """Searches from each of the begins in another part of the runs; returns the best end, or known coordinates."""
-        each = [_Descent(space, evaluate, runs[i::parts] or runs, report) for i in range(parts)]
-        ends = [*known, *(part.run(begin, share // parts) for part, begin in zip(each, begins))]
+    def best_of_parts(begins: Sequence[np.ndarray], difference: float, known: np.ndarray) -> np.ndarray:
+        """Searches from each of the begins in another part of the runs; returns the best end, or `known`."""
+        parts, budget = len(begins), config.evaluations // (4 * len(begins))
+        ends = [known]
+        for i, begin in enumerate(begins):
+            ends.append(_Descent(space, evaluate, runs[i::parts] or runs, report, difference).run(begin, budget))
         costs = [_robust(found, space, x) for found, x in zip(evaluate([space.values(x) for x in ends], runs), ends)]
         return ends[int(np.argmin(costs))]
 
-    unit = descent.run(best(starts, STARTS), share)
-    other = best([unit, unit], 2, known=[unit])
-    if other is not unit:
-        unit = descent.run(other, share)
+    unit = best_of_parts(starts, DIFFERENCES[0], space.first)
+    for difference in DIFFERENCES:
+        unit = _Descent(space, evaluate, runs, report, difference).run(unit, config.evaluations // 4)
+    unit = best_of_parts([unit, unit], DIFFERENCES[-1], unit)
+    descent = _Descent(space, evaluate, runs, report, DIFFERENCES[-1])
+    unit = descent.run(unit, max(config.evaluations - evaluate.count, 0))
     descent.rows(unit)
     descent.jacobian(unit, counts_jumps=False)  # for the uncertainty
     empty = np.zeros((0, len(space.names))), np.zeros((0, len(runs)))
@@ -155,7 +160,7 @@ def _robust(evaluation: Evaluation, space: ParameterSpace, unit: np.ndarray) -> 
 
 
 class _Descent:
-    """One search by least squares, in some of the runs."""
+    """One search by least squares, in some of the runs, with one step of finite differences."""
 
     def __init__(
         self,
@@ -163,8 +168,10 @@ class _Descent:
         evaluate: Evaluates,
         runs: Sequence[int],
         report: Callable[[str], None],
+        difference: float,
     ) -> None:
         self._space, self._evaluate, self._runs, self._report = space, evaluate, runs, report
+        self._difference = difference
         self.residuals: list[np.ndarray] = []
         self.jacobians: list[np.ndarray] = []
 
@@ -195,8 +202,8 @@ class _Descent:
     def jacobian(self, unit: np.ndarray, counts_jumps: bool = True) -> np.ndarray:
         """Central differences, one-sided at the bounds; see `slopes` for differences that do not count jumps."""
         space, count = self._space, len(unit)
-        low = np.maximum(unit - DIFFERENCE, 0.0)
-        high = np.minimum(unit + DIFFERENCE, 1.0)
+        low = np.maximum(unit - self._difference, 0.0)
+        high = np.minimum(unit + self._difference, 1.0)
         steps = [np.where(np.arange(count) == i, side, unit) for i in range(count) for side in (low, high)]
         found = self._evaluate([space.values(each) for each in steps], self._runs)
         columns, priors = [], []

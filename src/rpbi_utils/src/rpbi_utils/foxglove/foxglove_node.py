@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import ctypes
 import sys
 from functools import partial
 
@@ -14,10 +15,16 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 NAME = "foxglove"
 PORT = 8765
 """Port that Foxglove and Lichtblick suggest."""
+M_MMAP_THRESHOLD, LARGE_BYTES = -3, 512 * 1024
+"""Option of the C library (malloc.h), and size of messages whose memory returns to the system when they are freed.
+
+By default, this size grows up to 32 MB, and the memory of smaller messages stays with the process.
+"""
 
 
 def main() -> None:
     """Runs the node. Exits with 1 if the port is in use, before it registers and so ends a node of its name."""
+    ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE_BYTES)
     arguments = _parser().parse_args(rospy.myargv(sys.argv)[1:])
     try:
         from .bridge_node import FoxgloveNode
