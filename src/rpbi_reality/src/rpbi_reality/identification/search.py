@@ -125,7 +125,8 @@ def _least_squares(
 
     Contacts make the errors jump at some values of a parameter, and a search can end at such a jump. Therefore:
 
-    - Short searches begin at several values, each with another part of the runs. The best of their results goes on.
+    - Short searches begin at several values, each with another part of the runs. The search continues from the best
+      of their results.
     - The differences for the derivatives are large at first, so that they reach over jumps, and become smaller
       (implicit filtering, Kelley 2011).
     - From the end, searches in each half of the runs, which jump elsewhere, look for a way on.
