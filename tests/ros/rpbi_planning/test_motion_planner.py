@@ -24,6 +24,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from robot_model.geometry import Pose as RobotPose
 from robot_model.geometry import angle_between
 from ros_pybullet_interface.msg import PybulletObject
+from rpbi_planning.braking import SampledMotion
 from rpbi_planning.msg import (
     MotionRequest,
     MoveRobotAction,
@@ -31,6 +32,7 @@ from rpbi_planning.msg import (
     MoveRobotActionResult,
     MoveRobotGoal,
 )
+from rpbi_planning.ros.motion_messages import trajectory_message
 from rpbi_planning.srv import PlanAndMove, PlanMotion
 
 LINK, NAMES = "panda_grasptarget", [f"panda_joint{i}" for i in range(1, 8)]
@@ -138,6 +140,14 @@ def test_path_and_ghost_are_shown(planner):
     ghosts.wait_for(10)
     shown = {each.id: each.pose.position for each in ghosts.messages[-1].markers}
     assert len(shown) > 8
+
+
+def test_times_of_a_trajectory_message_increase_strictly():
+    times = np.array([0.0, 0.037, 0.037 + 1e-12, 0.04])
+    rows = np.arange(4.0)[:, None]
+    message = trajectory_message(["joint"], SampledMotion(times, rows, rows, rows))
+    assert [point.time_from_start.to_nsec() for point in message.points] == [0, 37_000_000, 40_000_000]
+    assert [point.positions[0] for point in message.points] == [0.0, 2.0, 3.0]
 
 
 def sent_at(stamp: rospy.Time, goal: MoveRobotGoal) -> MoveRobotActionGoal:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import rospy
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -23,6 +24,8 @@ from .scene_topics import SceneTopics
 
 MAX_TEXT = 20_000
 """Largest length of YAML in a request [characters]."""
+SHORTEST_S = 1e-6
+"""Shortest time between two points of a trajectory message; its times are whole nanoseconds [s]."""
 GOALS = "joints, named, pose or goal"
 
 
@@ -88,6 +91,8 @@ def positions_in(message: JointState, field: str) -> dict[str, float]:
 def trajectory_message(joint_names: Sequence[str], trajectory: Any, stamp: rospy.Time | None = None) -> JointTrajectory:
     """Converts a timed trajectory of n joints to a message.
 
+    Two points within `SHORTEST_S` would have the same time in a message, so the first of them is left out.
+
     Args:
         joint_names: Names of the n joints.
         trajectory: Has `times` of shape (k,) [s], and `positions`, `velocities` and `accelerations` of shape (k, n).
@@ -95,7 +100,10 @@ def trajectory_message(joint_names: Sequence[str], trajectory: Any, stamp: rospy
     """
     message = JointTrajectory(joint_names=list(joint_names))
     message.header.stamp = stamp or rospy.Time()
-    rows = zip(trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
+    times = np.asarray(trajectory.times)
+    kept = np.diff(times, append=math.inf) > SHORTEST_S
+    motion = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    rows = zip(times[kept], *(np.asarray(each)[kept] for each in motion))
     message.points = [
         JointTrajectoryPoint(list(q), list(v), list(a), (), rospy.Duration.from_sec(float(time_s)))
         for time_s, q, v, a in rows
