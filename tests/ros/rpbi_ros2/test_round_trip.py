@@ -47,7 +47,7 @@ def check_round_trip(ros, ros2, publisher, package: str) -> None:
             return bool(back[name].messages)
 
         try:
-            wait_until(is_back, f"{name} is back")
+            wait_until(is_back, f"{name} is back", every_s=1.0)  # more copies would delay the messages after them
         except TimeoutError:
             print(ros.output(bridge), ros.output(peer.process), peer.topics())
             raise
