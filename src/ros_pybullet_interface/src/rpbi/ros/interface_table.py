@@ -67,7 +67,7 @@ PARAMETERS = (
     NodeParameter(
         "~config",
         False,
-        "The main YAML file as a mapping; with `~config_file`, keys that replace those of the file. One is required.",
+        "The main YAML file as a mapping; with `~config_file`, keys that replace those of the file. Set at least one.",
     ),
     NodeParameter(
         "use_sim_time", False, "Whether stamps are the world's time, else wall time; from here or a namespace above."
