@@ -19,9 +19,11 @@ from rpbi.gym.randomization import Randomization
 from rpbi.world.loading import load_world
 from rpbi_reality.evaluation import world_file
 from rpbi_reality.identification.candidate import CandidateWorld, WorldTemplate
+from rpbi_reality.identification.evaluator import Evaluator
 from rpbi_reality.identification.fit_config import FitConfig
-from rpbi_reality.identification.identify import identify_world, write_results
+from rpbi_reality.identification.identify import identify_world, read_recordings, write_results
 from rpbi_reality.identification.recordings import MeasuredRun, PoseTrack
+from rpbi_reality.identification.search import search
 
 TABLE = {
     "name": "table",
@@ -93,6 +95,16 @@ def test_known_values_are_within_five_percent_and_within_their_intervals(world, 
         assert low <= true <= high and high - low < 4.0 * tolerance
     assert result.after.mean < 0.1 * result.before.mean
     assert len(result.held_out) == 1
+
+
+@pytest.mark.parametrize("evaluations", [10, 25, 60])
+def test_a_search_stays_within_its_evaluations(world, motion, evaluations):
+    config = fit(evaluations=evaluations)
+    evaluator = Evaluator(world, config, read_recordings(motion, config), None, 1)
+    with evaluator.running() as evaluate:
+        search(config, evaluate, range(3))
+    check_of_effects = 3
+    assert evaluator.simulated <= 3 * (evaluations + check_of_effects)
 
 
 def test_one_seed_leads_to_equal_files_with_any_processes(world, motion, tmp_path):

@@ -40,6 +40,7 @@ class Evaluates(Protocol):
     """Evaluates candidates, in any simulator; see `Evaluator` for the members."""
 
     count: int
+    simulated: int
     problems: dict[str, int]
 
     def __call__(self, candidates: Sequence[Mapping[str, float]], runs: Sequence[int]) -> list[Evaluation]: ...
@@ -135,6 +136,8 @@ class Evaluator:
         self._pool: ProcessPoolExecutor | None = None
         self.count = 0
         """Number of evaluated candidates."""
+        self.simulated = 0
+        """Number of simulated runs, over all candidates."""
         self.problems: dict[str, int] = {}
         """Why candidates could not be simulated, with the number of such candidates."""
 
@@ -163,6 +166,7 @@ class Evaluator:
         tasks = [(values, part) for values in candidates for part in parts]
         done = list(map(_evaluate, tasks) if self._pool is None else self._pool.map(_evaluate, tasks))
         self.count += len(candidates)
+        self.simulated += len(candidates) * len(runs)
         found = []
         for index in range(len(candidates)):
             mine = done[index * len(parts) : (index + 1) * len(parts)]

@@ -123,7 +123,9 @@ class FitConfig(ConfigModel):
         "mean distance and angle over time, divided by their standard deviations; only for `cmaes`.",
     )
     seed: Count = Field(0, description="Seed of the search and of the bootstrap.")
-    evaluations: Annotated[Count, Field(ge=10)] = Field(400, description="Largest number of simulated candidates.")
+    evaluations: Annotated[Count, Field(ge=10)] = Field(
+        400, description="Largest number of candidates that are simulated in all runs."
+    )
     step: Positive = Field(0.2, description="First step of the search, as a fraction of the bounds.")
     start_s: Annotated[NonNegative, Unit("s")] = Field(
         0.0, description="Simulated time before a run starts, in which robots come to rest."

@@ -51,12 +51,13 @@ class MujocoEvaluator:
 
     def __init__(self, config: FitConfig, data: TossData) -> None:
         self._signal, self._data = config.measured["cube"], data
-        self.count = 0
+        self.count = self.simulated = 0
         self.problems: dict[str, int] = {}
 
     def __call__(self, candidates: Sequence[Mapping[str, float]], runs: Sequence[int]) -> list[Evaluation]:
         """Returns the errors of each candidate in these tosses."""
         self.count += len(candidates)
+        self.simulated += len(candidates) * len(runs)
         return [self._evaluate(MujocoCube(settings(values), self._data.frame_rate), runs) for values in candidates]
 
     def _evaluate(self, cube: MujocoCube, runs: Sequence[int]) -> Evaluation:

@@ -130,24 +130,32 @@ def _least_squares(
     - The differences for the derivatives are large at first, so that they reach over jumps, and become smaller
       (implicit filtering, Kelley 2011).
     - From the end, searches in each half of the runs, which jump elsewhere, look for a way on.
+
+    A candidate in a part of the runs counts as that part of an evaluation.
     """
     starts = [space.first, *qmc.Halton(len(space.names), seed=config.seed).random(STARTS - 1)]
+    before, slopes_and_start = evaluate.simulated, 2 * len(space.names) + 1
 
-    def best_of_parts(begins: Sequence[np.ndarray], difference: float, known: np.ndarray) -> np.ndarray:
+    def left() -> int:
+        """Returns the number of evaluations that are left for the search."""
+        return config.evaluations - slopes_and_start - math.ceil((evaluate.simulated - before) / len(runs))
+
+    def best_of_parts(begins: Sequence[np.ndarray], difference: float, known: np.ndarray, budget: int) -> np.ndarray:
         """Searches from each of the begins in another part of the runs; returns the best end, or `known`."""
-        parts, budget = len(begins), config.evaluations // (4 * len(begins))
-        ends = [known]
+        if budget < 2 * slopes_and_start:
+            return known
+        parts, ends = len(begins), [known]
         for i, begin in enumerate(begins):
             ends.append(_Descent(space, evaluate, runs[i::parts] or runs, report, difference).run(begin, budget))
         costs = [_robust(found, space, x) for found, x in zip(evaluate([space.values(x) for x in ends], runs), ends)]
         return ends[int(np.argmin(costs))]
 
-    unit = best_of_parts(starts, DIFFERENCES[0], space.first)
-    for difference in DIFFERENCES:
-        unit = _Descent(space, evaluate, runs, report, difference).run(unit, config.evaluations // 4)
-    unit = best_of_parts([unit, unit], DIFFERENCES[-1], unit)
+    unit = best_of_parts(starts, DIFFERENCES[0], space.first, left() // 4)
+    for searches, difference in zip((4, 3, 2), DIFFERENCES):
+        unit = _Descent(space, evaluate, runs, report, difference).run(unit, left() // searches)
+    unit = best_of_parts([unit, unit], DIFFERENCES[-1], unit, left() // 2)
     descent = _Descent(space, evaluate, runs, report, DIFFERENCES[-1])
-    unit = descent.run(unit, max(config.evaluations - evaluate.count, 0))
+    unit = descent.run(unit, left())
     descent.rows(unit)
     descent.jacobian(unit, counts_jumps=False)  # for the uncertainty
     empty = np.zeros((0, len(space.names))), np.zeros((0, len(runs)))
@@ -177,7 +185,15 @@ class _Descent:
         self.jacobians: list[np.ndarray] = []
 
     def run(self, unit: np.ndarray, evaluations: int) -> np.ndarray:
-        """Returns the coordinates with the smallest loss that are found from a start."""
+        """Returns the coordinates with the smallest loss that are found from a start.
+
+        Args:
+            unit: The start.
+            evaluations: Largest number of candidates.
+        """
+        steps = evaluations // (2 * len(unit) + 1)
+        if steps < 2:  # the first one evaluates the start
+            return unit
         solved = least_squares(
             self.rows,
             np.clip(unit, 1e-3, 1.0 - 1e-3),
@@ -185,7 +201,7 @@ class _Descent:
             (0.0, 1.0),
             loss="soft_l1",
             f_scale=SOFT,
-            max_nfev=max(3, evaluations // (2 * len(unit) + 1)),
+            max_nfev=steps,
             x_scale="jac",
             xtol=1e-6,
             ftol=1e-6,
