@@ -20,12 +20,15 @@ class Part(NamedTuple):
         file: Name of the picture's file.
         middle: Middle of the part, in shares of the picture's width and height from its top left.
         width: Share of the picture's width.
+        height: Share of the picture's height, between which and the card's height there is white; None for the card's
+            proportions.
         frame: Number of the frame, if the picture moves.
     """
 
     file: str
     middle: tuple[float, float]
     width: float
+    height: float | None = None
     frame: int = 0
 
 
@@ -36,7 +39,7 @@ PARTS = {
     "card_planning.png": Part("planning.png", (0.51, 0.41), 0.4),
     "card_data.png": Part("clutter_labels.png", (0.36, 0.5), 0.66),
     "card_learning.png": Part("scene_cup.gif", (0.6, 0.3), 0.78, frame=48),
-    "card_reality.png": Part("reality_tosses.png", (0.315, 0.155), 0.23),
+    "card_reality.png": Part("reality_tosses.png", (0.255, 0.155), 0.37, 0.235),
     "card_viewers.png": Part("browser.png", (0.5, 0.36), 1.0),
 }
 """The parts, indexed by the name of the card's picture."""
@@ -48,9 +51,12 @@ def draw(path: Path) -> None:
     with Image.open(IMAGES / part.file) as picture:
         picture.seek(part.frame)
         width, (column, row) = part.width * picture.width, part.middle
-        height = width * SIZE[1] / SIZE[0]
+        height = width * SIZE[1] / SIZE[0] if part.height is None else part.height * picture.height
         left = min(max(0.0, column * picture.width - width / 2), picture.width - width)
         top = min(max(0.0, row * picture.height - height / 2), picture.height - height)
         box = (left, top, left + width, top + height)
-        small = picture.convert("RGB").resize(SIZE, Image.Resampling.LANCZOS, box)
-    write_png(path, small, dither=True)
+        rows = round(SIZE[0] * height / width)
+        small = picture.convert("RGB").resize((SIZE[0], rows), Image.Resampling.LANCZOS, box)
+    card = Image.new("RGB", SIZE, "white")
+    card.paste(small, (0, (SIZE[1] - rows) // 2))
+    write_png(path, card, dither=True)

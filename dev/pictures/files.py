@@ -12,7 +12,7 @@ MAX_MOVIE_BYTES = 3_000_000
 """Largest size of a moving picture, so that pages load fast."""
 NEARLY_WHITE = 245
 """Colours whose red, green and blue are larger become white."""
-SAMPLES = 8
+SAMPLES = 20
 """Number of frames from which the common colours are taken."""
 
 

@@ -29,7 +29,7 @@ MOTION, SOLVER = CONFIGS / "interpolation/traj_lwr.yaml", CONFIGS / "kuka_lwr_ik
 PERIOD_S, AFTER_S = 0.01, 1.0
 """Time between two targets, and time for which the motion is watched after the last ball [s]."""
 CAMERA = Photographer((-1.0, 1.25, 0.70), (-0.27, 0.10, 0.37), 37.0, (600, 600))
-OFFSETS_PX = {"green": (-110.0, 20.0), "blue": (20.0, -20.0), "red": (24.0, 14.0)}
+OFFSETS_PX = {"green": (-112.0, 4.0), "blue": (20.0, -20.0), "red": (24.0, 14.0)}
 COLOURS = {"green": "#17804a", "blue": "#2659d9", "red": "#d92e20"}
 
 

@@ -6,20 +6,23 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pybullet
 from files import write_gif, write_png
+from overlay import Overlay
 from PIL import Image, ImageDraw
 from render import Photographer, font, with_caption
 from storyboard import grid
 
+from custom_ros_tools.plot_style import BLUE, ORANGE
 from robot_model.geometry import Vector
 from rpbi.gym.env import WorldEnv
 from rpbi.world import World
-from rpbi_examples.scenes.scene import run_scene
+from rpbi_examples.scenes.scene import Scene, run_scene
+from rpbi_examples.scenes.shelves import Shelves
+from rpbi_examples.scenes.talos import Talos
 from rpbi_examples.scenes.task import EnvStage, make_env
 
-SEED = 3
+SEED, SHELVES_SEED = 3, 10
 HZ, MAX_SCENE_BYTES = 10.0, 1_500_000
 """Frames per second of the moving pictures, and their largest size."""
 SIZE_PX, SHEET_PX, COLUMNS = (560, 420), (320, 240), 4
@@ -37,6 +40,8 @@ class View(NamedTuple):
         end_s: Time after which no frame follows, if the scene has not ended before [s].
         still_s: Time of the picture in the sheet [s].
         speed: Simulated seconds per second of the moving picture.
+        slow: Times between which the picture is in slow motion [s], and the speed in it; none if it is empty.
+        seed: Seed of the scene.
     """
 
     position: Vector
@@ -46,16 +51,28 @@ class View(NamedTuple):
     end_s: float = 90.0
     still_s: float = 0.1
     speed: float = 1.0
+    slow: tuple[float, float, float] | tuple[()] = ()
+    seed: int = SEED
+
+    def frames(self) -> list[tuple[float, float]]:
+        """Returns time [s] and speed of each frame."""
+        frames, time_s = [], self.start_s
+        while time_s < self.end_s:
+            is_slow = bool(self.slow) and self.slow[0] <= time_s < self.slow[1]
+            speed = self.slow[2] if is_slow else self.speed
+            frames.append((time_s, speed))
+            time_s += speed / HZ
+        return frames
 
 
 SCENES = {
     "cup": View((1.6, 0.2, 1.75), (0.29, 0.2, 0.71), 34.0, 1.0, speed=3.0, still_s=6.0),
     "wiping": View((0.8, 1.0, 0.95), (0.05, 0.0, 0.29), 38.0, 1.0, speed=2.5, still_s=8.0),
     "handover": View((1.95, -1.9, 1.6), (0.6, -0.15, 1.17), 31.0, speed=4.0, still_s=9.0),
-    "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 1.0, 7.0, 3.96, 0.75),
+    "talos": View((2.0, 1.6, 1.5), (0.15, 0.0, 0.95), 36.0, 1.0, 6.0, 3.9, 0.8, (3.8, 4.4, 0.2)),
     "factory": View((1.2, 0.3, 1.7), (0.36, 0.02, 0.95), 39.0, 2.0, speed=4.0, still_s=12.0),
     "dual_arm": View((2.2, 1.2, 1.5), (0.33, 0.05, 0.6), 32.0, speed=1.5, still_s=5.0),
-    "shelves": View((-1.3, 1.7, 1.9), (0.42, 0.0, 0.85), 38.0, speed=4.0, still_s=1.7),
+    "shelves": View((-1.25, 0.0, 2.15), (0.5, 0.0, 0.85), 42.0, speed=5.5, still_s=1.7, seed=SHELVES_SEED),
 }
 """Views of the scenes."""
 CLUTTER = View((0.60, -0.52, 1.00), (0.0, 0.0, 0.46), 46.0, end_s=2.0, still_s=3.0, speed=0.5)
@@ -91,12 +108,32 @@ WORDS = {
 """Captions of the sheet."""
 
 
+def mark_push(world: World, scene: Scene, view: Overlay) -> None:
+    """Names the push of the scene `talos` while the stick shows it."""
+    assert isinstance(scene, Talos)
+    stick = world.bodies["stick"].base_pose().position
+    if stick[2] > 0.0:
+        view.words(stick, f"push of {scene.impulse:g} N s", "#b91c1c", (40, 40))
+
+
+def mark_goals(_: World, scene: Scene, view: Overlay) -> None:
+    """Marks the goals of the scene `shelves` that the arms have not reached yet, in one colour for each arm."""
+    assert isinstance(scene, Shelves)
+    for (name, goals), colour in zip(scene.goals.items(), (BLUE, ORANGE)):
+        for goal in goals[scene.visited[name] :]:
+            view.dot(goal.position, colour, 8.0)
+
+
+MARKS = {"shelves": mark_goals, "talos": mark_push}
+"""Functions that mark what a scene is about, by the scenes' names."""
+
+
 class FilmedStage(EnvStage):
     """Runs a scene in an environment, and photographs its world at the given times [s]."""
 
-    def __init__(self, env: WorldEnv, camera: Photographer, times_s: Sequence[float]) -> None:
+    def __init__(self, env: WorldEnv, name: str, camera: Photographer, times_s: Sequence[float]) -> None:
         super().__init__(env)
-        self._filmed, self._camera, self._times_s = env, camera, times_s
+        self._filmed, self._name, self._camera, self._times_s = env, name, camera, times_s
         self.pictures: list[Image.Image] = []
 
     def cycle(self) -> None:
@@ -104,16 +141,19 @@ class FilmedStage(EnvStage):
         super().cycle()
         done = len(self.pictures)
         if done < len(self._times_s) and self._filmed.task.scene.seen.time_s >= self._times_s[done]:
-            self.pictures.append(self._camera.picture(self._filmed.world))
+            view = Overlay(self._camera, self._camera.picture(self._filmed.world))
+            if self._name in MARKS:
+                MARKS[self._name](self._filmed.world, self._filmed.task.scene, view)
+            self.pictures.append(view.picture())
 
 
 def filmed(name: str, view: View, size: tuple[int, int], times_s: Sequence[float]) -> list[Image.Image]:
     """Runs an episode of a scene, and returns pictures of its world at the given times [s]."""
     env = make_env(name)
-    env.task.seed = SEED
-    env.reset(seed=SEED)
+    env.task.seed = view.seed
+    env.reset(seed=view.seed)
     env.task.scene.longest_s = times_s[-1] + 0.1
-    stage = FilmedStage(env, Photographer(view.position, view.target, view.fov_deg, size), times_s)
+    stage = FilmedStage(env, name, Photographer(view.position, view.target, view.fov_deg, size), times_s)
     run_scene(env.task.scene, stage)
     env.close()
     return stage.pictures
@@ -134,10 +174,10 @@ def observed(name: str, view: View, size: tuple[int, int], times_s: Sequence[flo
 def movie(name: str, path: Path) -> None:
     """Writes the moving picture of a scene, or of the world `clutter`."""
     view, film = (CLUTTER, observed) if name == "clutter" else (SCENES[name], filmed)
-    times_s = np.arange(view.start_s, view.end_s, view.speed / HZ).tolist()
-    pictures = film(name, view, SIZE_PX, times_s)
-    speed = f"{view.speed:g} x speed"
-    for picture in pictures:
+    frames = view.frames()
+    pictures = film(name, view, SIZE_PX, [time_s for time_s, _ in frames])
+    for picture, (_, frame_speed) in zip(pictures, frames):
+        speed = f"{frame_speed:g} x speed"
         draw, corner = ImageDraw.Draw(picture), (SIZE_PX[0] - 10, SIZE_PX[1] - 10)
         left, top, right, bottom = draw.textbbox(corner, speed, font(15), "rb")
         draw.rectangle((left - 5, top - 3, right + 5, bottom + 3), "white")

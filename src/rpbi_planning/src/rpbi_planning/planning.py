@@ -11,17 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from custom_ros_tools.errors import UnknownNameError
-from safe_robot.check import MarginViolation
-from safe_robot.commands.escape import find_escape
-from safe_robot.limits import MotionLimits
 
 from .certify import certified
-from .collision import CollisionModel, Meeting, collision_model
+from .collision import CollisionModel, collision_model
 from .constraints import BoundConstraint, PathConstraint
 from .goals import PlanningGoal
 from .group import Group
 from .planner import PlanningProblem, length
 from .planners import PLANNERS
+from .reasons import meetings_of, near_at_start, outside_limits, violated_constraint, way_out
 from .scene import PlanningScene
 from .shortening import shortened
 from .timing import PathTiming, PlannedTrajectory, TimingLimits
@@ -36,8 +34,6 @@ MAX_GROUP = 40
 """Largest number of joints that are planned for at once."""
 MAX_GOALS = 12
 """Largest number of configurations of a goal that planners try to reach."""
-OUTSIDE = 1e-3
-"""Distance beyond a limit up to which a start is moved to the limit [rad or m]; measured positions are noisy."""
 RESERVE = 0.97, 0.95, 0.9
 """Shares of the limits of velocity, acceleration and jerk that are used. The guard brakes in steps of its period, and
 passes the limits a little when a motion uses them fully."""
@@ -186,10 +182,10 @@ class _Plan:
         bound = [BoundConstraint(each, group) for each in constraints]
         model = collision_model(scene, group, bound)
         start = group.of(full)
-        if reason := self._outside(start):
+        if reason := outside_limits(group, start):
             return self._failed(reason)
         start = np.clip(start, group.lower, group.upper)
-        if bound and (problem := self._violated(bound, start)):
+        if problem := violated_constraint(bound, start):
             return self._failed(f"the start violates a path constraint: {problem}")
         if reason := self._adapt_to_start(model, start):
             return self._failed(reason)
@@ -206,7 +202,7 @@ class _Plan:
                 return self._failed("cancelled")
             return self._failed(
                 "no path was found within the time limit: the goal may be enclosed; a longer time limit, another "
-                f"planner or less padding may help{self._near(model, start)}"
+                f"planner or less padding may help{near_at_start(model, start)}"
             )
         if shorten_s > 0.0:
             end = time.monotonic() + shorten_s
@@ -266,54 +262,13 @@ class _Plan:
             processor_s=self._clock.processor_s,
         )
 
-    def _outside(self, start: Array) -> str:
-        group = self._group
-        outside = np.maximum(group.lower - start, start - group.upper)
-        i = int(np.argmax(outside))
-        if outside[i] <= OUTSIDE:
-            return ""
-        limits = f"{group.lower[i]:g} to {group.upper[i]:g}"
-        return f"the start is outside the limits of joint '{group.joint_names[i]}': {start[i]:g}, limits {limits}"
-
-    def _violated(self, bound: Sequence[BoundConstraint], q: Array) -> str:
-        worst = min(bound, key=lambda each: float(each.margins(q[None])[0]))
-        margin = float(worst.margins(q[None])[0])
-        if margin >= 0.0:
-            return ""
-        return f"{type(worst.constraint).__name__} of link '{worst.constraint.link}' misses by {-margin:.3g}"
-
     def _adapt_to_start(self, model: CollisionModel, start: Array) -> str:
         """Lowers the paddings of pairs that are nearer at the start; returns a reason if shapes penetrate there."""
         distances = model.distances(start)
         if (distances < 0.0).any():
-            return f"the start is in collision: {self._collision(model, start)}"
+            return f"the start is in collision: {way_out(model, start)}"
         model.set_paddings(np.minimum(model.padding, np.maximum(distances - LESS_M, 0.0)))
         return ""
-
-    def _near(self, model: CollisionModel, start: Array) -> str:
-        """Names shapes that are nearer than the padding at the start; empty if there are none."""
-        if not model.is_lowered:
-            return ""
-        distances = model.distances(start)
-        pairs = [
-            f"'{a}' and '{b}' are {1e3 * distances[i]:.2f} mm apart"
-            for i in np.argsort(distances)[:3].tolist()
-            for a, b in [(model.shapes[model.first[i]].name, model.shapes[model.second[i]].name)]
-        ]
-        return f"; at the start, {', '.join(pairs)}"
-
-    def _collision(self, model: CollisionModel, q: Array) -> str:
-        meetings = model.meetings(q)
-        group = self._group
-        limits = MotionLimits(group.lower, group.upper, group.velocity, group.acceleration, group.jerk)
-        way = find_escape(q, limits, lambda at: _inside(model, at))
-        words = "; ".join(map(str, meetings[:3])) + (f"; and {len(meetings) - 3} more" if len(meetings) > 3 else "")
-        if way is None or way.direction is None:
-            return f"{words}; no motion of the joints separates all of them"
-        moves = ", ".join(
-            f"{name} {speed:+.2f}" for name, speed in zip(group.joint_names, way.direction) if abs(speed) > 0.005
-        )
-        return f"{words}; this motion of the joints leads out: {moves}"
 
     def _goals(
         self,
@@ -346,9 +301,7 @@ class _Plan:
             if model.is_free(q):
                 free.append(q)
             elif not nearest:
-                violated = self._violated(bound, q) if bound else ""
-                meetings = model.meetings(q)
-                nearest = violated or ("; ".join(map(str, meetings[:3])) if meetings else "outside the limits")
+                nearest = violated_constraint(bound, q) or meetings_of(model, q) or "outside the limits"
             if len(free) == MAX_GOALS:
                 break
         if not free:
@@ -395,20 +348,6 @@ def _kept(scene: PlanningScene, model: CollisionModel, bound: Sequence[BoundCons
     if scene.kept_by_planners[0] != key:
         scene.kept_by_planners = key, {}
     return scene.kept_by_planners[1]
-
-
-def _inside(model: CollisionModel, q: Array) -> list[MarginViolation]:
-    distances = model.distances(q)
-    found = []
-    for i in np.flatnonzero(distances < model.padding).tolist():
-        steps = np.array([model.distances(q + 1e-4 * row, [i])[0] for row in np.eye(len(q))])
-        a, b = (model.shapes[each[i]].name for each in (model.first, model.second))
-        subject = str(Meeting(a, b, float(distances[i]), float(model.padding[i])))
-        gradient = (steps - distances[i]) / 1e-4
-        found.append(
-            MarginViolation("planning", (a, b), subject, float(distances[i]), float(model.padding[i]), gradient)
-        )
-    return found
 
 
 def _products(per_robot: Sequence[Array]) -> list[list[Array]]:

@@ -34,7 +34,7 @@ from .box_services import GOAL, PushedBox
 from .dmp_services import ServerMotion
 from .person import HALF_SIDE_M, TIP_RADIUS_M
 from .recording_services import begin_episode, discard_episode, finish_episode
-from .report import SIZE, Run, draw_paths, draw_pipeline, write_picture, write_summary
+from .report import SIZES, Run, draw_paths, draw_pipeline, write_picture, write_summary
 from .skill import Learn, PushSkill, learn_dmp
 
 LEARN: dict[str, Learn] = {"own": learn_dmp, "server": ServerMotion}
@@ -256,10 +256,10 @@ class LfdNode:
     def _figure(self, name: str) -> Figure:
         """Returns an empty figure. With `~plot`, the figure has a window."""
         if not self._plots:
-            return Figure(figsize=SIZE, layout="constrained")
+            return Figure(figsize=SIZES[name], layout="constrained")
         from matplotlib import pyplot  # needs a screen
 
-        figure = pyplot.figure(name, figsize=SIZE, layout="constrained", clear=True)
+        figure = pyplot.figure(name, figsize=SIZES[name], layout="constrained", clear=True)
         pyplot.show(block=False)
         return figure
 

@@ -29,7 +29,8 @@ SHOWN_SHARE = 2.0 / 3.0
 TIP, BOX, GOAL = BLUE, ORANGE, GREEN
 SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
-SIZE = (13.0, 8.4)
+SIZES = {"paths": (11.0, 6.0), "pipeline": (9.6, 12.0)}
+"""Widths and heights of the figures [in], by the names of their files."""
 BESIDE = 0.025
 """Width of the labels next to a plot, as a share of the figure."""
 
@@ -160,9 +161,8 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
     """Draws six plots, from the operator's signal to the executed plan, and connects the plots with arrows."""
     assert executed.plan is not None
     plan, seconds = executed.plan, shown.table.index - shown.table.index[0]
-    grid = figure.subplots(2, 3)
-    signal, where, states = grid[0]
-    execution, planned, learned = grid[1]
+    grid = figure.subplots(3, 2)
+    (signal, where), (learned, states), (planned, execution) = grid
     for key, colour in zip(KEYS, (TIP, GOAL)):
         signal.plot(seconds, shown.table[key], color=colour, label=f"{key[-1]}", drawstyle="steps-post")
     signal.set(title="1  operator: signal h", xlabel="time [s]", ylabel="velocity [m/s]")
@@ -183,7 +183,7 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
     _map(planned, goal, "5  plan from a random start")
     _draw_run(execution, goal, executed, f"6  executed: box {executed.error}", with_plan=False)
     for axes in grid.flat:
-        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(-0.05, -0.16), ncols=3)
+        axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(-0.05, -0.16), ncols=3)
     figure.get_layout_engine().set(w_pad=0.25, h_pad=0.12)
     figure.draw_without_rendering()
     for begin, end in ((signal, where), (where, states), (states, learned), (learned, planned), (planned, execution)):

@@ -53,7 +53,12 @@ HARMLESS = {"station", "floor"}
 
 
 class Shelves(Scene):
-    """Two KUKA iiwa arms reach into compartments of a bookcase in turn, and never touch the blocks that pass by."""
+    """Two KUKA iiwa arms reach into compartments of a bookcase in turn, and never touch the blocks that pass by.
+
+    Attributes:
+        goals: Poses of the link in the world, for each arm.
+        visited: Number of goals that each arm has reached.
+    """
 
     world = "{rpbi_examples}/configs/shelves/config.yaml"
     watch = Watched(robots=(*BASES, *(rail.robot for rail in RAILS)), contacts=tuple(BASES))
@@ -65,7 +70,7 @@ class Shelves(Scene):
         super().__init__(random)
         self.goals = {name: [_goal(random, base) for _ in range(GOALS)] for name, base in BASES.items()}
         self.goal_numbers = tuple(number for goals in self.goals.values() for goal in goals for number in goal.position)
-        self._visited = {name: 0 for name in BASES}
+        self.visited = {name: 0 for name in BASES}
         self._stayed_s = {name: 0.0 for name in BASES}
         self._touched: set[str] = set()
         self._arms: dict[str, YieldingArm] = {}
@@ -84,26 +89,26 @@ class Shelves(Scene):
 
     def note(self) -> None:
         """Records which goals are reached, in their order, and which bodies the arms have touched."""
-        for name, count in self._visited.items():
+        for name, count in self.visited.items():
             self._touched |= {each.other for each in self.seen.contacts[name]} - HARMLESS
             if count < GOALS:
                 self._stayed_s[name] = (self._stayed_s[name] + CYCLE_S) * self._is_at(name, self.goals[name][count])
                 if self._stayed_s[name] >= STAY_S - CYCLE_S:
-                    self._visited[name], self._stayed_s[name] = count + 1, 0.0
+                    self.visited[name], self._stayed_s[name] = count + 1, 0.0
 
     def has_succeeded(self) -> bool:
         """Returns whether both arms have been at all their goals, and have touched nothing."""
-        return sum(self._visited.values()) == self.of and not self._touched
+        return sum(self.visited.values()) == self.of and not self._touched
 
     def score(self) -> tuple[int, int]:
         """Returns the number of reached goals, or 0 after a touch, and the number of all goals."""
-        return 0 if self._touched else sum(self._visited.values()), self.of
+        return 0 if self._touched else sum(self.visited.values()), self.of
 
     def fault(self) -> str:
         """Returns the bodies that were touched, or the number of goals that were not reached."""
         if self._touched:
             return f"touched: {', '.join(sorted(self._touched))}"
-        return f"{self.of - sum(self._visited.values())} goals not reached"
+        return f"{self.of - sum(self.visited.values())} goals not reached"
 
     def figures(self) -> dict[str, float]:
         """Returns the time for which the arms waited for carriages or retreated."""

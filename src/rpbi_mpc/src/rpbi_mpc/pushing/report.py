@@ -95,10 +95,18 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
     seen = table.dropna(subset=["state.x"])
     axes.plot(seen["state.x"], seen["state.y"], color=ORANGE, label="slider")
     axes.plot(seen["measured.pusher_x"], seen["measured.pusher_y"], color=INK, lw=1, label="pusher")
-    for row in seen.iloc[np.linspace(0, len(seen) - 1, OUTLINES).astype(int)].itertuples(index=False):
-        record = dict(zip(seen.columns, row))
-        outline = _outline(np.array([record[f"state.{name}"] for name in ("x", "y", "yaw")]), controller.config.slider)
-        axes.plot(*outline.T, color=ORANGE, alpha=0.45, lw=1)
+    rows = np.linspace(0, len(seen) - 1, OUTLINES).astype(int)
+    poses = seen[["state.x", "state.y", "state.yaw"]].to_numpy()[rows]
+    for pose in poses:
+        axes.plot(*_outline(pose, controller.config.slider).T, color=ORANGE, alpha=0.3, lw=1)
+    for name, pose, style in (("start", poses[0], ":"), ("end", poses[-1], "-")):
+        axes.plot(
+            *_outline(pose, controller.config.slider).T, color=ORANGE, ls=style, lw=2, label=f"slider at the {name}"
+        )
+        axes.annotate(name, pose[:2], (16, 0), textcoords="offset points", va="center", color=ORANGE)
+    middle = len(points) // 2
+    arrow = {"arrowstyle": "-|>", "color": GREEN, "lw": 2, "mutation_scale": 24}
+    axes.annotate("", points[middle + len(points) // 20], points[middle], arrowprops=arrow)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     legend_beside(axes)
     figure.savefig(file, bbox_inches="tight")

@@ -1,5 +1,6 @@
 """Markers for RViz: the closest points of shapes near each other, and the boxes that links must not leave."""
 
+import math
 from collections.abc import Iterator
 from threading import Condition
 
@@ -10,7 +11,6 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
-from robot_model.geometry import plus, scaled
 from safe_robot.checks.environment import Environment
 from safe_robot.checks.link_box import BoxConfig, LinkBox
 from safe_robot.checks.self_collision import SelfCollision
@@ -19,6 +19,8 @@ from safe_robot.guard import Guard
 HZ = 10.0
 WITHIN_M = 0.15
 """Pairs that are further apart are not shown [m]."""
+TEXT_M, STEEP_M = 0.03, 1e-3
+"""Height of the letters, and horizontal length below which a line counts as vertical [m]."""
 UNLIMITED_M = 2.0
 """Coordinate, positive or negative, at which an unlimited side of a box is drawn [m]."""
 NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.0), ColorRGBA(0.2, 0.5, 1.0, 0.15)
@@ -70,13 +72,9 @@ class GuardMarkers:
                 line = self._marker(check.name, 2 * i, Marker.LINE_LIST, points=ends, color=color)
                 line.scale.x = 0.004
                 yield line
-                x, y, z = scaled(0.5, plus(contact.first, contact.second))
                 text = self._marker(check.name, 2 * i + 1, Marker.TEXT_VIEW_FACING, color=color)
-                text.pose.position, text.scale.z, text.text = (
-                    Point(x, y, z + 0.03),
-                    0.03,
-                    f"{1e3 * contact.distance:.0f} mm",
-                )
+                text.pose.position = Point(*_beside(np.array(contact.first), np.array(contact.second)))
+                text.scale.z, text.text = TEXT_M, f"{1e3 * contact.distance:.0f} mm"
                 yield text
 
     def _boxes(self) -> Iterator[Marker]:
@@ -92,6 +90,13 @@ class GuardMarkers:
         marker.header.frame_id = self._frame
         marker.pose = Pose(orientation=Quaternion(w=1.0))
         return marker
+
+
+def _beside(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Returns the middle of a text beside a line, at the height of the line's middle, shape (3,) [m]."""
+    x, y, _ = second - first
+    across = np.array((-y, x, 0.0)) if math.hypot(x, y) > STEEP_M else np.array((0.0, 1.0, 0.0))
+    return (first + second) / 2.0 + 2.0 * TEXT_M * across / np.linalg.norm(across)
 
 
 def _boxes_of(check: LinkBox) -> list[BoxConfig]:
