@@ -1,19 +1,25 @@
-"""From a recording of a running simulator to the parameters of its twin."""
+"""From a recording of a running simulator to the parameters of its twin, also as on docs/identification.md."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
 import pytest
 import rosbag
+import rosgraph
 import rospy
 import yaml
-from ros_system import wait_until
+from page_blocks import ROOT, blocks_of
+from page_runs import agree
+from ros_system import RPBI, stop_group, wait_until
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 from ros_pybullet_interface.msg import PlannedInput
-from ros_pybullet_interface.srv import StepN, StepWithInputs
+from ros_pybullet_interface.srv import ListObjects, StepN, StepWithInputs
 from rpbi_reality.evaluation import world_file
 from rpbi_reality.identification.fit_config import FitConfig
 from rpbi_reality.identification.identify import identify_world
@@ -67,3 +73,32 @@ def test_gain_and_delay_of_a_recorded_arm_are_found(ros, tmp_path):
     # with delays of 12 to 13.7 ms, the twin moves exactly as recorded
     assert found.values["delay"] == pytest.approx(DELAY_S + STEP_S / 4.0, abs=STEP_S / 4.0)
     assert found.after.mean < 1e-3 < 1.0 < found.before.mean
+
+
+def _recorded() -> set[str]:
+    """Returns the topics to which rosbag subscribes."""
+    return {topic for topic, nodes in rosgraph.Master("/tests").getSystemState()[1] if "/record_" in "".join(nodes)}
+
+
+@pytest.mark.thorough
+def test_the_twin_of_the_page_moves_like_the_laboratory(ros, tmp_path):
+    started, recorded = (command.split() for command, _ in blocks_of("docs/identification.md", "shell")[0].commands)
+    [(identify, shown)] = blocks_of("docs/identification.md", "console")[0].commands
+    [script] = [each.text for each in blocks_of("docs/identification.md", "python") if "rospy" in each.text]
+    world = started[2].replace("src/", f"{ROOT}/src/")
+    ros.start([RPBI, "launch", world, *started[3:]])
+    ros.call("/rpbi/list_objects", ListObjects)
+    recorder = ros.start([*recorded[:2], "-O", str(tmp_path / "run.bag"), *recorded[4:]])
+    wait_until(lambda: _recorded() >= set(recorded[4:]), "all topics are recorded")
+    assert ros.call("/rpbi/start", Trigger).success
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=120.0)
+    stop_group(recorder)
+    command = identify.replace("./rpbi", RPBI).replace("src/", f"{ROOT}/src/")
+    done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True, timeout=500.0)
+    assert done.returncode == 0, done.stderr
+    results = "\n".join(line for line in done.stdout.splitlines() if not line.startswith("out/"))
+    assert agree(shown, results, varies=True), results
+    found = yaml.safe_load((tmp_path / "out/identify/report.json").read_text())["parameters"]
+    found = {name: each["value"] for name, each in found.items()}
+    assert found["friction"] == pytest.approx(0.42, rel=0.01) and found["mass"] == pytest.approx(0.85, rel=0.01)
+    assert found["gain"] == pytest.approx(0.07, rel=0.01) and 0.0 <= found["delay"] <= STEP_S
