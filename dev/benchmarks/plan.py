@@ -318,15 +318,14 @@ def _measure(made: BenchScene, oracle: Oracle, tally: Tally, longest_s: float, q
             tally.solvable += solvable
             print(f"{made.kind}: query {number}: {result.message}, {time.perf_counter() - begin:.1f} s", flush=True)
             continue
-        times = result.times_s
-        to_path = sum(times[key] for key in ("scene", "goals", "planning"))
+        times, spent = result.times_s, result.processor_s
+        to_path, path_processor = (sum(each[key] for key in ("scene", "goals", "planning")) for each in (times, spent))
         tally.solvable += 1
-        tally.in_1_s += to_path <= 1.0
-        tally.in_5_s += to_path <= 5.0
+        tally.in_1_s += path_processor <= 1.0  # on one core, whatever else the computer does
+        tally.in_5_s += path_processor <= 5.0
         tally.path_s.append(to_path)
         tally.timed_s.append(to_path + times["shortening"] + times["timing"])
-        spent = result.processor_s
-        tally.path_processor_s.append(sum(spent[key] for key in ("scene", "goals", "planning")))
+        tally.path_processor_s.append(path_processor)
         tally.timed_processor_s.append(tally.path_processor_s[-1] + spent["shortening"] + spent["timing"])
         assert result.trajectory is not None
         step = STEP if quick or number >= FINE_QUERIES else FINE_STEP
@@ -351,9 +350,13 @@ def _results(tallies: dict[str, Tally]) -> list[Result]:
     for kind, each in tallies.items():
         share = 100.0 / max(each.solvable, 1)
         add(
-            kind, f"solved within 1 s, of {each.solvable} solvable of {each.total}", share * each.in_1_s, "%", LEAST_1_S
+            kind,
+            f"solved within 1 s of processor time, of {each.solvable} solvable of {each.total}",
+            share * each.in_1_s,
+            "%",
+            LEAST_1_S,
         )
-        add(kind, "solved within 5 s", share * each.in_5_s, "%", LEAST_5_S)
+        add(kind, "solved within 5 s of processor time", share * each.in_5_s, "%", LEAST_5_S)
         for steps, wall, processor, most in (
             ("to a proven path", each.path_s, each.path_processor_s, Target(100.0)),
             ("to a shortened and timed one", each.timed_s, each.timed_processor_s, Target(400.0)),

@@ -38,7 +38,7 @@ CAMERA = "initialCameraPosition=0.75,-1.65,1.1&initialCameraLookAt=0.53,0.0,0.27
 """Position of the page's camera, and point that it looks at [m]: the arm is to the left of the panel."""
 CLOSE = "[...document.querySelectorAll('[class*=Notification-closeButton]')].map((each) => each.click()).length"
 CONNECTED = "document.body.innerText.includes('Connected')"
-EPISODE_SIZE, PUSHED_S = (960, 880), 10.0
+EPISODE_SIZE, PUSHED_S = (960, 880), 4.5
 """Size of the page of an episode in its own pixels, and time in it at which the arm pushes the box [s]."""
 PLAYED_S = "document.querySelector('#root [role=slider]')?.getAttribute('aria-valuenow')"
 SEEK = """(() => { const input = document.querySelector('#root input[inputmode]');

@@ -47,16 +47,13 @@ def test_the_search_finds_the_friction(tosses, tmp_path):
         for name, value in TRUE.items()
         if name != "friction" and value > 0.0
     }
-    centres = {
-        name: {"set": f"mujoco.{name}", "bounds": [-1e-7, 1e-7], "start": 0.0} for name in ("centre_x", "centre_y")
-    }
     data = {
         "method": "cmaes",
         "objective": "mean_error",
         "runs": {"count": 2},
         "evaluations": 150,
         "measured": {"cube": {"object": "cube", "position_sigma": 0.0089, "rotation_sigma": 0.061}},
-        "parameters": {**few, **fixed, **centres},
+        "parameters": {**few, **fixed},
     }
     (tmp_path / "fit.yaml").write_text(yaml.safe_dump(data))
     found = fit_mujoco(tosses, tmp_path / "fit.yaml")

@@ -27,14 +27,14 @@ CONTACT_PRESETS: dict[str, ContactPreset] = {
     "impact": ContactPreset(
         {
             "changeDynamics": {
-                "lateralFriction": 0.17,
-                "restitution": 0.061,
-                "contactStiffness": 20300.0,
-                "contactDamping": 56.4,
+                "lateralFriction": 0.173,
+                "restitution": 0.0675,
+                "contactStiffness": 10350.0,
+                "contactDamping": 48.5,
                 "linearDamping": 0.0,
                 "angularDamping": 0.0,
             },
-            "contactFriction": {"edge": 0.167, "face": 0.204},
+            "contactFriction": {"edge": 0.173, "face": 0.191},
         },
         {"timeStep": 0.00168918919},
     ),

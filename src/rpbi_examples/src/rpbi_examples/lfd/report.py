@@ -181,10 +181,10 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
     planned.plot(shown.table["tip/x"], shown.table["tip/y"], label="demonstration", **SHOWN_STYLE)
     _draw_plan(planned, plan)
     _map(planned, goal, "5  plan from a random start")
-    _draw_run(execution, goal, executed, f"6  executed: box {executed.error}", with_plan=False)
+    _draw_run(execution, goal, executed, "6  executed", with_plan=False)
     for axes in grid.flat:
-        axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(-0.05, -0.16), ncols=3)
-    figure.get_layout_engine().set(w_pad=0.25, h_pad=0.12)
+        axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(-0.05, -0.16), ncols=2)
+    figure.get_layout_engine().set(w_pad=0.3, h_pad=0.15)
     figure.draw_without_rendering()
     for begin, end in ((signal, where), (where, states), (states, learned), (learned, planned), (planned, execution)):
         _arrow(figure, begin, end)
@@ -233,13 +233,13 @@ def _outline(box: PlanarPose) -> Array:
 def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
     """Draws an arrow from one plot to a neighbouring plot. Both plots must already be at their final positions."""
     one, other = begin.get_position(), end.get_position()
-    x, y = (one.x0 + 3.0 * one.x1) / 4.0, (one.y0 + one.y1) / 2.0
+    x, y = max(one.x1, other.x1) - BESIDE, (one.y0 + one.y1) / 2.0
     if abs(one.y0 - other.y0) > 0.1:
-        tail, head = (x, one.y0 - BESIDE), (x, other.y1 + BESIDE)
+        tail, head = (x, one.y0 - 1.5 * BESIDE), (x, other.y1 + BESIDE)
     elif one.x0 < other.x0:
         tail, head = (one.x1 + BESIDE / 4.0, y), (other.x0 - 2.0 * BESIDE, y)
     else:
-        tail, head = (one.x0 - 2.0 * BESIDE, y), (other.x1 + BESIDE / 4.0, y)
+        tail, head = (one.x0 - 2.6 * BESIDE, y), (other.x1 + BESIDE / 4.0, y)
     arrow = FancyArrowPatch(
         tail, head, transform=figure.transFigure, arrowstyle="simple", mutation_scale=22, color=GREY
     )

@@ -101,9 +101,9 @@ class RunsConfig(ConfigModel):
     """Runs of the data from which parameters are identified; all other runs are held out."""
 
     count: Annotated[Count, Field(ge=1)] | None = Field(
-        None, description="Number of runs, chosen at random by `seed`. By default, three quarters of the runs."
+        None, description="Number of runs, chosen by `seed`. By default, three quarters of the runs."
     )
-    seed: Count = Field(0, description="Seed of this choice.")
+    seed: Count | None = Field(0, description="Seed of this random choice; null chooses every n-th run.")
     names: ListOf[Text] = Field((), description="Names of the runs, instead of `count`.")
     experiment: Count | None = Field(None, description="Only runs of this experiment, in files with several.")
 

@@ -79,7 +79,11 @@ def chosen_runs(config: FitConfig, names: list[str], file: str) -> tuple[list[in
             raise ConfigError(
                 [Problem(file, "runs.count", f"expected at most {len(names)}, the number of runs; got {count}")]
             )
-        trained = sorted(np.random.default_rng(config.runs.seed).permutation(len(names))[:count].tolist())
+        if config.runs.seed is None:
+            chosen = [index * len(names) // count for index in range(count)]
+        else:
+            chosen = np.random.default_rng(config.runs.seed).permutation(len(names))[:count].tolist()
+        trained = sorted(chosen)
     return trained, [index for index in range(len(names)) if index not in set(trained)]
 
 

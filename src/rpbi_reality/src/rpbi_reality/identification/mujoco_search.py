@@ -38,12 +38,9 @@ class MujocoFit(NamedTuple):
 
 def settings(values: Mapping[str, float]) -> MujocoSettings:
     """Returns the settings of a candidate; see configs/tosses/fit_mujoco.yaml for the parameters."""
-    plain = {name: value for name, value in values.items() if name in MujocoSettings._fields}
-    return MEASURED._replace(
-        **plain,
-        centre=(values["centre_x"], values["centre_y"], values["centre_z"]),
-        inertia=(values["inertia_xy"], values["inertia_xy"], values["inertia_z"]),
-    )
+    plain = {name: value for name, value in values.items() if name in MujocoSettings._fields and name != "inertia"}
+    moment = values["inertia"]
+    return MEASURED._replace(**plain, centre=(0.0, 0.0, values["centre_z"]), inertia=(moment, moment, moment))
 
 
 class MujocoEvaluator:

@@ -53,14 +53,13 @@ MEASURED = MujocoSettings(
 IDENTIFIED = MujocoSettings(
     side=0.10248,
     gravity=9.605,
-    friction=0.17784,
-    time_constant=0.009362,
-    damping_ratio=0.7373,
-    impedance=0.8801,
-    width=0.000928,
-    table_height=0.000753,
-    inertia=(0.001328, 0.001328, 0.001306),
-    centre=(0.000083, -0.000066, 0.006966),
+    friction=0.17899,
+    time_constant=0.006519,
+    damping_ratio=0.6308,
+    impedance=0.9047,
+    table_height=0.000778,
+    inertia=(0.00125, 0.00125, 0.00125),
+    centre=(0.0, 0.0, 0.005777),
 )
 """Found by the search of configs/tosses/fit_mujoco.yaml."""
 SETTINGS = {

@@ -19,8 +19,8 @@ from safe_robot.guard import Guard
 HZ = 10.0
 WITHIN_M = 0.15
 """Pairs that are further apart are not shown [m]."""
-TEXT_M, STEEP_M = 0.03, 1e-3
-"""Height of the letters, and horizontal length below which a line counts as vertical [m]."""
+TEXT_M, STEEP = 0.03, 0.5
+"""Height of the letters [m], and ratio of horizontal to vertical length below which a line counts as vertical."""
 UNLIMITED_M = 2.0
 """Coordinate, positive or negative, at which an unlimited side of a box is drawn [m]."""
 NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.0), ColorRGBA(0.2, 0.5, 1.0, 0.15)
@@ -93,10 +93,10 @@ class GuardMarkers:
 
 
 def _beside(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Returns the middle of a text beside a line, at the height of the line's middle, shape (3,) [m]."""
-    x, y, _ = second - first
-    across = np.array((-y, x, 0.0)) if math.hypot(x, y) > STEEP_M else np.array((0.0, 1.0, 0.0))
-    return (first + second) / 2.0 + 2.0 * TEXT_M * across / np.linalg.norm(across)
+    """Returns the middle of a text next to a line, at the height of the line's middle, shape (3,) [m]."""
+    x, y, z = second - first
+    across = np.array((-y, x, 0.0)) if math.hypot(x, y) > STEEP * abs(z) else np.array((0.0, 1.0, 0.0))
+    return (first + second) / 2.0 + 3.0 * TEXT_M * across / np.linalg.norm(across)
 
 
 def _boxes_of(check: LinkBox) -> list[BoxConfig]:
