@@ -84,6 +84,21 @@ QUESTIONS = {
     "how do I export a dataset to LeRobot": ("datasets",),
     "how to change the gravity": ("time", "worlds", "dynamics", "commands"),
     "why is my robot not moving": ("questions", "robots"),
+    "save simulation state": ("replay_and_fork",),
+    "set gravity": ("dynamics", "worlds", "time", "commands", "topics_and_services"),
+    "rosbag to csv": ("data",),
+    "use my own xacro file": ("robots",),
+    "Robotiq": ("from_the_release", "questions"),
+    "gym env custom": ("gym",),
+    "custom controller": ("controllers", "extending"),
+    "custom sensor": ("extending",),
+    "UR5 real robot": ("real_robots",),
+    "simulation speed": ("slow", "time"),
+    "change friction at runtime": ("dynamics",),
+    "record video": ("windows", "data"),
+    "save world to file": ("replay_and_fork",),
+    "deformable object": ("soft_bodies",),
+    "emergency stop": ("real_robots", "safety"),
 }
 """Questions about simulators; for each, pages of which one has the answer."""
 
