@@ -106,7 +106,7 @@ def run(quick: bool) -> list[Result]:
         Result("grasp", f"drift in the worst second of {hold_s:g}", worst, "mm/s", None, Target(DRIFT_MM_S)),
         Result(
             "grasp",
-            f"placed within {PLACED_MM:g} mm, of {seeds}",
+            f"boxes placed within {PLACED_MM:g} mm, of {seeds} trials",
             sum(each <= PLACED_MM for each in off),
             "",
             None,

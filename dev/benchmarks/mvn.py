@@ -41,7 +41,7 @@ def run(quick: bool) -> list[Result]:
         what = f"{people} at {HZ} Hz"
         results.append(Result("mvn", f"{what}: share of a core", share, "%", floor_share or None, target))
         poses = arrivals["/mvn/segments"].rate_hz
-        results.append(Result("mvn", f"{what}: poses of person 0", poses, "Hz", HZ))
+        results.append(Result("mvn", f"{what}: poses of the first person", poses, "Hz", HZ))
     return results
 
 

@@ -35,12 +35,11 @@ def run(quick: bool) -> list[Result]:
     )
     line = next(line for line in alone.stdout.splitlines() if line.startswith("result: "))
     floor = json.loads(line.partition(": ")[2])
-    of = f"of {resets} resets"
     return [
-        Result("reset", f"median {of}", found["median_ms"], "ms", floor["load_ms"], Target(TARGET_MS)),
-        Result("reset", f"slowest {of}", found["slowest_ms"], "ms"),
-        Result("reset", f"memory after {of}", found["grown_mb"], "MB more", None, Target(5.0)),
-        Result("reset", f"threads and files after {of}", found["grown_handles"], "more", None, Target(0)),
-        Result("reset", f"warnings during {of}", len(told), "", None, Target(0)),
+        Result("reset", f"median of {resets} resets", found["median_ms"], "ms", floor["load_ms"], Target(TARGET_MS)),
+        Result("reset", f"slowest of {resets} resets", found["slowest_ms"], "ms"),
+        Result("reset", f"memory added by {resets} resets", found["grown_mb"], "MB more", None, Target(5.0)),
+        Result("reset", f"threads and files added by {resets} resets", found["grown_handles"], "more", None, Target(0)),
+        Result("reset", f"warnings during {resets} resets", len(told), "", None, Target(0)),
         Result("reset", "hash of the state", floor["hash_us"], "us", floor["tick_us"]),
     ]

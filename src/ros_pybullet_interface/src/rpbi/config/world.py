@@ -183,8 +183,8 @@ class WorldConfig(WithContactPreset):
         1.0, description="Simulated seconds per second of wall time, at least 0.001; 0 runs as fast as possible."
     )
     clock_hz: Hz | None = optional(
-        "Largest rate of /clock messages, in wall time. By default, the smaller of 1000 Hz and the rate of the "
-        "ticks, and 250 Hz with `real_time_factor: 0`."
+        "Largest rate of /clock messages, in wall time. By default, 250 Hz with `real_time_factor: 0`, otherwise "
+        "the rate of the ticks, at most 1000 Hz."
     )
     tf_prefix: FrameId | None = optional(
         "Prefix of all TF frames, so that two worlds can share one TF tree. By default, frames have no prefix."

@@ -93,16 +93,14 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
     points = controller.path.points
     axes.plot(*points.T, color=GREEN, lw=2, label="path")
     seen = table.dropna(subset=["state.x"])
-    axes.plot(seen["state.x"], seen["state.y"], color=ORANGE, label="slider")
-    axes.plot(seen["measured.pusher_x"], seen["measured.pusher_y"], color=INK, lw=1, label="pusher")
+    axes.plot(seen["state.x"], seen["state.y"], color=ORANGE, lw=1.2, label="box")
+    axes.plot(seen["measured.pusher_x"], seen["measured.pusher_y"], color=INK, lw=1, label="hand")
     rows = np.linspace(0, len(seen) - 1, OUTLINES).astype(int)
     poses = seen[["state.x", "state.y", "state.yaw"]].to_numpy()[rows]
     for pose in poses:
         axes.plot(*_outline(pose, controller.config.slider).T, color=ORANGE, alpha=0.3, lw=1)
     for name, pose, style in (("start", poses[0], ":"), ("end", poses[-1], "-")):
-        axes.plot(
-            *_outline(pose, controller.config.slider).T, color=ORANGE, ls=style, lw=2, label=f"slider at the {name}"
-        )
+        axes.plot(*_outline(pose, controller.config.slider).T, color=ORANGE, ls=style, lw=2, label=f"box at the {name}")
         axes.annotate(name, pose[:2], (16, 0), textcoords="offset points", va="center", color=ORANGE)
     middle = len(points) // 2
     arrow = {"arrowstyle": "-|>", "color": GREEN, "lw": 2, "mutation_scale": 24}

@@ -19,6 +19,8 @@ DIFFERENCES = (0.1, 0.03, 0.01)
 """Steps of finite differences, as fractions of the bounds: at first, in between, and at the end of a search."""
 STARTS = 4
 """Number of values at which a search by least squares begins."""
+REACHES = (0.1, 0.04)
+"""Standard deviations of random steps along the least determined direction, as fractions of the bounds."""
 SOFT = 0.5
 """Residual beyond which the loss of least squares grows linearly, in standard deviations."""
 NO_EFFECT = 1e-9
@@ -125,41 +127,65 @@ def _least_squares(
 
     Contacts make the errors jump at some values of a parameter, and a search can end at such a jump. Therefore:
 
-    - Short searches begin at several values, each with another part of the runs. The search continues from the best
-      of their results.
+    - Many values, spread over the bounds, are tried in a few runs. Short searches begin at the best of them, each in
+      another part of the runs. The search continues from the best of their results.
     - The differences for the derivatives are large at first, so that they reach over jumps, and become smaller
       (implicit filtering, Kelley 2011).
-    - From the end, searches in each half of the runs, which jump elsewhere, look for a way on.
+    - From the end, random steps along the directions that the data determine least look for a way on.
 
     A candidate in a part of the runs counts as that part of an evaluation.
     """
-    starts = [space.first, *qmc.Halton(len(space.names), seed=config.seed).random(STARTS - 1)]
     before, slopes_and_start = evaluate.simulated, 2 * len(space.names) + 1
 
     def left() -> int:
         """Returns the number of evaluations that are left for the search."""
         return config.evaluations - slopes_and_start - math.ceil((evaluate.simulated - before) / len(runs))
 
-    def best_of_parts(begins: Sequence[np.ndarray], difference: float, known: np.ndarray, budget: int) -> np.ndarray:
-        """Searches from each of the begins in another part of the runs; returns the best end, or `known`."""
-        if budget < 2 * slopes_and_start:
-            return known
-        parts, ends = len(begins), [known]
-        for i, begin in enumerate(begins):
-            ends.append(_Descent(space, evaluate, runs[i::parts] or runs, report, difference).run(begin, budget))
-        costs = [_robust(found, space, x) for found, x in zip(evaluate([space.values(x) for x in ends], runs), ends)]
-        return ends[int(np.argmin(costs))]
+    def sorted_by_cost(units: Sequence[np.ndarray], some: Sequence[int]) -> list[np.ndarray]:
+        """Returns coordinates in the order of their losses in some runs."""
+        found = evaluate([space.values(x) for x in units], some)
+        return [units[i] for i in np.argsort([_robust(each, space, x) for each, x in zip(found, units)])]
 
-    unit = best_of_parts(starts, DIFFERENCES[0], space.first, left() // 4)
-    for searches, difference in zip((4, 3, 2), DIFFERENCES):
+    def best_of_parts(begins: Sequence[np.ndarray], budget: int) -> np.ndarray:
+        """Searches from each of the begins in another part of the runs; returns the best end, or the first begin."""
+        parts, ends = len(begins), [begins[0]]
+        for i, begin in enumerate(begins):
+            ends.append(_Descent(space, evaluate, runs[i::parts], report, DIFFERENCES[0]).run(begin, budget))
+        return sorted_by_cost(ends, runs)[0]
+
+    random, unit = np.random.default_rng(config.seed), space.first
+    if left() // 4 >= 2 * slopes_and_start:
+        tried = [unit, *qmc.Halton(len(unit), seed=config.seed).random(left() // 4)]
+        begins = sorted_by_cost(tried, runs[:: max(1, len(runs) // 4)])[: min(STARTS, len(runs))]
+        unit = best_of_parts(begins, left() // 4)
+    for searches, difference in zip((5, 4, 3), DIFFERENCES):
         unit = _Descent(space, evaluate, runs, report, difference).run(unit, left() // searches)
-    unit = best_of_parts([unit, unit], DIFFERENCES[-1], unit, left() // 2)
     descent = _Descent(space, evaluate, runs, report, DIFFERENCES[-1])
+    for reach in REACHES:
+        count = left() // 4 - slopes_and_start
+        if count >= slopes_and_start:
+            descent.rows(unit)
+            steps = _least_determined(descent.jacobian(unit, counts_jumps=False), reach)
+            tried = [unit, *(np.clip(unit + steps @ random.normal(size=len(unit)), 0.0, 1.0) for _ in range(count))]
+            best = sorted_by_cost(tried, runs)[0]
+            unit = unit if best is unit else descent.run(best, left() // 2)
     unit = descent.run(unit, left())
     descent.rows(unit)
     descent.jacobian(unit, counts_jumps=False)  # for the uncertainty
     empty = np.zeros((0, len(space.names))), np.zeros((0, len(runs)))
     return Found(unit, *empty, descent.residuals, descent.jacobians)
+
+
+def _least_determined(jacobian: np.ndarray, reach: float) -> np.ndarray:
+    """Returns a matrix that maps normal numbers to steps, which change the errors equally in all directions.
+
+    Args:
+        jacobian: Derivatives of the residuals, shape (residuals, m).
+        reach: Standard deviation of the steps along the least determined direction; no direction has more.
+    """
+    _, singular, axes = np.linalg.svd(jacobian, full_matrices=False)
+    smallest = max(float(singular[-1]), 1e-12)
+    return np.asarray(axes.T * (reach * smallest / np.maximum(singular, smallest)))
 
 
 def _robust(evaluation: Evaluation, space: ParameterSpace, unit: np.ndarray) -> float:
