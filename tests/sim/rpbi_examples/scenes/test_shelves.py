@@ -94,7 +94,7 @@ def test_arms_that_do_not_yield_touch_a_carriage(env, monkeypatch):
 def test_a_touch_counts_as_a_failure(env):
     scene = env.task.scene
     touch = SimpleNamespace(other="upper_carriage")
-    scene._visited = {name: shelves.GOALS for name in BASES}
+    scene.visited = {name: shelves.GOALS for name in BASES}
     scene._touched = set()
     assert scene.has_succeeded()
     joints = {name: dict.fromkeys(env.world.bodies, 0.0) for name in BASES}
