@@ -40,7 +40,8 @@ class View(NamedTuple):
         end_s: Time after which no frame follows, if the scene has not ended before [s].
         still_s: Time of the picture in the sheet [s].
         speed: Simulated seconds per second of the moving picture.
-        slow: Times between which the picture is in slow motion [s], and the speed in it; none if it is empty.
+        slow: Times between which the picture is in slow motion [s], and the speed in it; none if it is empty. A scene
+            has one picture per cycle, so that the slowest speed is `HZ` times the duration of a cycle.
         seed: Seed of the scene.
     """
 
