@@ -111,6 +111,29 @@ QUESTIONS = {
     "save world to file": ("replay_and_fork",),
     "deformable object": ("soft_bodies",),
     "emergency stop": ("real_robots", "safety"),
+    "randomizing": ("gym",),
+    "debugging": ("questions",),
+    "bibtex": ("citing",),
+    "IMU": ("limits",),
+    "tactile": ("contacts",),
+    "admittance": ("controllers",),
+    "terrain": ("worlds", "limits"),
+    "weld": ("hands",),
+    "getContactPoints": ("from_pybullet",),
+    "setJointMotorControl2": ("from_pybullet",),
+    "API reference": ("api/index",),
+    "Python API": ("api/index", "python"),
+    "joint torque control": ("controllers", "robots"),
+    "velocity control": ("robots",),
+    "solver iterations": ("physics",),
+    "hand-eye calibration": ("tracking", "cameras"),
+    "end-effector pose": ("ik",),
+    "object falls through floor": ("physics",),
+    "rpbi/kuka_lwr/joint_states": ("robots", "topics_and_services"),
+    "UR10": ("example_robots",),
+    "not supported": ("limits",),
+    "apply external force": ("dynamics",),
+    "stop simulation": ("time",),
 }
 """Questions about simulators; for each, pages of which one has the answer."""
 
@@ -222,7 +245,8 @@ def test_planted_faults_are_named(tmp_path):
 
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_search_finds_the_answer(search, question):
-    first = [Path(page).stem for page in search.pages(question) if not page.startswith("api/")][:3]
+    pages = [page[: -len(".html")] for page in search.pages(question)]
+    first = [page for page in pages if not page.startswith("api/") or page == "api/index"][:3]
     assert set(QUESTIONS[question]) & set(first), first
 
 

@@ -64,14 +64,18 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
-    """Applies `extra.search`, replaces texts and targets of links, and removes the marks of blocks."""
+    """Applies `extra.search` and `extra.reference`, replaces texts and targets of links, and removes marks of blocks."""
     if page.file.src_uri == "index.md":
         page.meta["hide"] = ["toc"]  # cards need the space; front matter would be seen on repository hosts
     search = config.extra["search"]
     page.meta["search"] = {"boost": search["boost"].get(page.file.src_uri, 1)}
     page.meta["tags"] = search["words"].get(page.file.src_uri, [])
     named = FILE_AS_TEXT.sub(lambda match: f"[{heading(config, match[1])}](", MARK.sub("", markdown))
-    return LINK_OUT.sub(r"](files/\1)", named)
+    linked = LINK_OUT.sub(r"](files/\1)", named)
+    if targets := config.extra["reference"].get(page.file.src_uri):
+        links = " · ".join(f"[{title_of(config, target)}]({target})" for target in targets)
+        linked += f"\n\n---\n\n**Reference:** {links}\n"
+    return linked
 
 
 def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
@@ -80,9 +84,31 @@ def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
     return CELL.sub(lambda cell: SHORT_CODE.sub(r'<code class="short">\1</code>', cell[0]), html)
 
 
+def title_of(config: Any, target: str) -> str:
+    """Returns the text of a link to a page of the reference, or to one of its sections."""
+    page, _, section = target.partition("#")
+    title = heading(config, page).replace("YAML reference", "YAML")
+    if not section:
+        return title
+    names = re.findall(r"^#+ (.*)", source(config, page).read_text(encoding="utf-8"), re.MULTILINE)
+    name = next((each for each in names if slug(each) == section), section)
+    return f"{title}: {name}" if page != "commands.md" else f"`./rpbi {name}`"
+
+
+def slug(text: str) -> str:
+    """Returns the anchor of a heading."""
+    return re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
+
+
+def source(config: Any, name: str) -> Path:
+    """Returns the file of a page, of docs or of this folder."""
+    path = Path(config.docs_dir, name)
+    return path if path.exists() else HERE / name
+
+
 def heading(config: Any, name: str) -> str:
     """Returns the first heading of a page, or its file name if the page is not there."""
-    path = Path(config.docs_dir, name)
+    path = source(config, name)
     found = re.search(r"^# (.*)", path.read_text(encoding="utf-8"), re.MULTILINE) if path.exists() else None
     return found[1] if found else name
 

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
 COMMANDS = ("shell", "console")
 """Languages of blocks with commands. In `console`, commands begin with `$ `, and other lines are their output."""
-LANGUAGES = {"python", *COMMANDS, "text", "yaml", "xml", "json", "cmake"}
+LANGUAGES = {"python", *COMMANDS, "text", "yaml", "xml", "json", "cmake", "bibtex"}
 _BLOCK = re.compile(
     r"(?:^ *<!-- ([^\n]*) -->\n)?^( *)```([^\n`]*)\n(.*?)^\2```$",
     re.MULTILINE | re.DOTALL,
