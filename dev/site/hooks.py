@@ -64,7 +64,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
-    """Applies `extra.search` and `extra.reference`, replaces texts and targets of links, and removes marks of blocks."""
+    """Applies `extra.search` and `extra.reference`, replaces parts of links, and removes the marks of blocks."""
     if page.file.src_uri == "index.md":
         page.meta["hide"] = ["toc"]  # cards need the space; front matter would be seen on repository hosts
     search = config.extra["search"]

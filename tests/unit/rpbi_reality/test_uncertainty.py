@@ -7,7 +7,8 @@ import pytest
 
 from rpbi_reality.identification import uncertainty as module
 from rpbi_reality.identification.fit_config import FitConfig
-from rpbi_reality.identification.search import Found, slopes
+from rpbi_reality.identification.least_squares import slopes
+from rpbi_reality.identification.parameter_space import Found
 from rpbi_reality.identification.uncertainty import lower_percent, uncertainty
 
 CONFIG = FitConfig.parse(
@@ -29,7 +30,7 @@ def _coverage(runs: int, trials: int = 300) -> float:
         shift = np.linalg.lstsq(np.concatenate(slopes), np.concatenate(noise), rcond=None)[0]
         rows = [each - slope @ shift for each, slope in zip(noise, slopes)]  # residuals are noise - slope (best - true)
         best = TRUE + shift
-        found = Found(best, np.zeros((0, 2)), np.zeros((0, runs)), rows, [-slope for slope in slopes])
+        found = Found(best, np.zeros((0, 2)), np.zeros((0, runs)), rows, [-slope for slope in slopes], np.zeros((0, 2)))
         intervals = uncertainty(CONFIG, found).intervals
         inside += sum(low <= true <= high for true, (low, high) in zip(TRUE, intervals.values()))
     return inside / trials / 2.0
@@ -40,6 +41,15 @@ def test_intervals_of_few_runs_hold(monkeypatch):
     assert 0.925 < _coverage(10) < 0.975
     monkeypatch.setattr(module, "lower_percent", lambda _: 2.5)
     assert _coverage(10) < 0.925
+
+
+def test_intervals_reach_over_the_best_values_of_parts():
+    rows, slope = [np.zeros(10)] * 10, [np.tile([[1.0, 0.0], [0.0, 1.0]], (5, 1))] * 10
+    parts = TRUE + [[0.05, 0.0], [-0.05, 0.0], [0.05, 0.0], [-0.05, 0.0]]
+    found = Found(TRUE, np.zeros((0, 2)), np.zeros((0, 10)), rows, slope, parts)
+    intervals = uncertainty(CONFIG, found).intervals
+    assert intervals["a"] == pytest.approx((0.4 - 0.05 * 2.776 / 2.0, 0.4 + 0.05 * 2.776 / 2.0), abs=1e-4)  # t, 4 parts
+    assert intervals["b"] == pytest.approx((0.6, 0.6), abs=1e-6)
 
 
 @pytest.mark.parametrize(("count", "percent"), [(10, 0.85), (20, 1.59), (10_000, 2.5)])

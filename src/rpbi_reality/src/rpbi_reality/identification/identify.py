@@ -20,9 +20,10 @@ from ..pose_errors import Interval, bootstrap
 from .candidate import WorldTemplate
 from .evaluator import Evaluation, Evaluator
 from .fit_config import FitConfig
+from .parameter_space import ParameterSpace
 from .pictures import parameter_picture
 from .recording_files import read_recordings
-from .search import ParameterSpace, search
+from .search import search
 from .uncertainty import Uncertainty, uncertainty
 
 DIGITS = 6

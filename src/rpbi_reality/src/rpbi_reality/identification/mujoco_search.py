@@ -15,8 +15,9 @@ from .candidate import mean_error
 from .evaluator import DIVERGED, Evaluation
 from .fit_config import FitConfig
 from .identify import chosen_runs, read_fit
+from .parameter_space import ParameterSpace
 from .recordings import PoseTrack
-from .search import ParameterSpace, search
+from .search import search
 from .uncertainty import uncertainty
 
 

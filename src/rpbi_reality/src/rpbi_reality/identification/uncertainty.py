@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import norm, t
 
 from .fit_config import FitConfig
-from .search import Found, ParameterSpace
+from .parameter_space import Found, ParameterSpace
 
 ROUNDS = 2000
 RIDGE = 1e-3
@@ -47,6 +47,9 @@ def uncertainty(config: FitConfig, found: Found) -> Uncertainty:
     else:
         shifts, hessian, count = _surrogate(found, random)
     low, high = (_percentile(shifts, percent) for percent in (lower_percent(count), 100.0 - lower_percent(count)))
+    if len(found.parts):
+        reach = _reach_of_parts(found)
+        low, high = np.minimum(low, -reach), np.maximum(high, reach)
     lowest, highest = (space.values(found.unit + side) for side in (low, high))
     intervals = {name: (lowest[name], highest[name]) for name in space.names}
     spread = shifts.std(0)
@@ -79,6 +82,18 @@ def _percentile(shifts: np.ndarray, percent: float) -> np.ndarray:
     centred = raw - np.median(shifts, axis=0)
     ends: np.ndarray = np.minimum(raw, centred) if percent < 50.0 else np.maximum(raw, centred)
     return ends
+
+
+def _reach_of_parts(found: Found) -> np.ndarray:
+    """Returns half the width of 95 % intervals from the best values of disjoint parts of the runs, shape (m,).
+
+    The derivatives at the best values do not know of other minima, in which a search can end. The parts do: each of
+    them has minima of its own (batch means, Law 2014, section 9.5.3; the distances are those from the result).
+    """
+    count = len(found.parts)
+    deviation = np.sqrt(((found.parts - found.unit) ** 2).mean(0))
+    half: np.ndarray = t.ppf(0.975, count) * deviation / np.sqrt(count)
+    return half
 
 
 def _gauss_newton(
