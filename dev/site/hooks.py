@@ -28,10 +28,12 @@ CELL = re.compile(r"<td[^>]*>.*?</td>")
 SHORT_CODE = re.compile(r"<code>([^<]{1,30})</code>")
 """A name in a cell of a table, which the style keeps on one line."""
 
-BOOST = 10.0
-"""Weight of a word in a title or in `extra.search.words`, compared with the text. With the theme's 1000 and 1,000,000,
-one word of a question decides alone.
+BOOSTS = {"title": 10.0, "tags": 1.0}
+"""Weights of a word in a title and in `extra.search.words`, compared with the text. With the theme's 1000 and
+1,000,000, one word of a question decides alone. Whole phrases of `extra.search.words` count in `query.js`.
 """
+OVERVIEW = re.compile(r"overview/(\w+)/index\.md")
+"""A page that lists all pages of its tab."""
 LOG = logging.getLogger("mkdocs.hooks.site")
 MIRROR = tempfile.TemporaryDirectory(prefix="site-api-")
 
@@ -60,6 +62,8 @@ def on_files(files: Files, config: Any) -> Files:
     added |= {f"files/{path}": ROOT / path for path in sorted(linked)}
     for uri, path in added.items():
         files.append(File.generated(config, uri, abs_src_path=str(path)))
+    for uri in sorted(set(OVERVIEW.findall(json.dumps(config.nav)))):
+        files.append(File.generated(config, f"overview/{uri}/index.md", content=""))
     return files
 
 
@@ -67,6 +71,8 @@ def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> st
     """Applies `extra.search` and `extra.reference`, replaces parts of links, and removes the marks of blocks."""
     if page.file.src_uri == "index.md":
         page.meta["hide"] = ["toc"]  # cards need the space; front matter would be seen on repository hosts
+    if OVERVIEW.fullmatch(page.file.src_uri):
+        return overview(page, config)
     search = config.extra["search"]
     page.meta["search"] = {"boost": search["boost"].get(page.file.src_uri, 1)}
     page.meta["tags"] = search["words"].get(page.file.src_uri, [])
@@ -82,6 +88,24 @@ def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
     """Shows the alternative text of a picture as its caption, and marks short code in tables."""
     html = PICTURE.sub(r"<figure>\1<figcaption>\2</figcaption></figure>", html)
     return CELL.sub(lambda cell: SHORT_CODE.sub(r'<code class="short">\1</code>', cell[0]), html)
+
+
+def overview(page: Page, config: Any) -> str:
+    """Returns a page that lists the pages of its tab with their first paragraphs."""
+    page.meta["search"] = {"exclude": True}
+    (tab,) = (each for each in config.extra["nav"].items if isinstance(each, Section) and page in each.children)
+    lines = [f"# {tab.title}", ""]
+    for child in tab.children:
+        if isinstance(child, Section):
+            lines += ["", f"## {child.title}", ""]
+        for each in pages_of(child):
+            if each is not page:
+                path = source(config, each.file.src_uri)
+                title = heading(config, each.file.src_uri)
+                lines.append(
+                    f"- [{title}](../../{each.file.src_uri}): {first_sentence(path.read_text(encoding='utf-8'))}"
+                )
+    return "\n".join(lines) + "\n"
 
 
 def title_of(config: Any, target: str) -> str:
@@ -130,17 +154,20 @@ def on_post_build(config: Any) -> None:
     site = Path(config.site_dir)
     lines = [f"# {config.site_name}", "", f"> {config.site_description}.", ""]
     for section in config.extra["nav"].items:
-        lines += [f"## {section.title}", "", *map(entry, pages_of(section)), ""]
-        for page in pages_of(section):
+        pages = [page for page in pages_of(section) if not OVERVIEW.fullmatch(page.file.src_uri)]
+        lines += [f"## {section.title}", "", *map(entry, pages), ""]
+        for page in pages:
             (site / page.file.src_uri).write_text(page.markdown, encoding="utf-8")
     (site / "llms.txt").write_text("\n".join(lines), encoding="utf-8")
     path = site / "search/search_index.json"
     index = json.loads(path.read_text(encoding="utf-8"))
-    for field in ("title", "tags"):
-        index["config"]["fields"][field]["boost"] = BOOST
+    for field, boost in BOOSTS.items():
+        index["config"]["fields"][field]["boost"] = boost
     path.write_text(json.dumps(index), encoding="utf-8")
     (worker,) = site.glob("assets/javascripts/workers/search.*.min.js")
-    query = (HERE / "query.js").read_text(encoding="utf-8")
+    words = config.extra["search"]["words"].items()
+    phrases = json.dumps({uri.replace(".md", ".html"): list(map(str, each)) for uri, each in words})
+    query = f"const PHRASES = {phrases}\n{(HERE / 'query.js').read_text(encoding='utf-8')}"
     worker.write_text(query + worker.read_text(encoding="utf-8"), encoding="utf-8")
 
 
@@ -153,6 +180,15 @@ def pages_of(item: Any) -> list[Page]:
 
 def entry(page: Page) -> str:
     """Returns the line of a page in llms.txt: its title, its Markdown and its first paragraph."""
-    text = re.sub(r"```.*?```|<!--.*?-->|^[#|!].*?$", "", page.markdown, flags=re.DOTALL | re.MULTILINE).strip()
-    first = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", " ".join(text.partition("\n\n")[0].split()))
-    return f"- [{page.title}]({page.file.src_uri}): {first}"
+    return f"- [{page.title}]({page.file.src_uri}): {first_paragraph(page.markdown)}"
+
+
+def first_paragraph(markdown: str) -> str:
+    """Returns the first paragraph of a page in one line, without links."""
+    text = re.sub(r"```.*?```|<!--.*?-->|^[#|!].*?$", "", markdown, flags=re.DOTALL | re.MULTILINE).strip()
+    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", " ".join(text.partition("\n\n")[0].split()))
+
+
+def first_sentence(markdown: str) -> str:
+    """Returns the first sentence of a page, without links."""
+    return re.split(r"(?<=[.:?])\s", first_paragraph(markdown))[0].rstrip(":") or ""

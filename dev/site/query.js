@@ -1,21 +1,33 @@
 // Part of the search's worker: drops words of a question that would match the beginnings of many others, such as "to",
-// and lists pages in which a section has most words of the question first.
+// and lists first the pages that have most words of the question: in one section, or in one of their PHRASES, which
+// mkdocs.yml names and the build writes in front of this file.
 const COMMON = new Set(
   "a an and are at can do does for from how i in is it my not of on or the there to what when where which why with".split(" ")
 )
 const QUERY = 2
 const RESULT = 3
+const singular = (word) => (word.length > 3 ? word.replace(/s$/, "") : word)
+const wordsOf = (text) => text.toLowerCase().split(/[\s\-/_.,:;()"?]+/).filter((word) => word && !COMMON.has(word)).map(singular)
+let asked = []
 self.addEventListener("message", ({ data }) => {
   if (data.type !== QUERY) return
   const words = data.data.split(" ").filter((word) => !COMMON.has(word.toLowerCase()))
   if (words.join("")) data.data = words.join(" ")
+  asked = wordsOf(data.data)
 })
+const inSection = (item) => Object.entries(item.terms).filter(([, found]) => found).map(([term]) => singular(term))
+function rankOf(page) {
+  const phrases = (PHRASES[page[0].location.split("#")[0]] || []).map(wordsOf)
+  const named = phrases.filter((phrase) => phrase.length && phrase.every((word) => asked.includes(word))).flat()
+  const counts = page.map((item) => new Set([...inSection(item), ...named]).size)
+  return [Math.max(...counts), new Set(named).size]
+}
 const send = self.postMessage.bind(self)
-const found = (item) => Object.values(item.terms).filter(Boolean).length
 self.postMessage = (message) => {
   if (message.type === RESULT) {
-    const most = new Map(message.data.items.map((page) => [page, Math.max(...page.map(found))]))
-    message.data.items.sort((a, b) => most.get(b) - most.get(a))
+    const ranks = new Map(message.data.items.map((page) => [page, rankOf(page)]))
+    const compare = ([most, named], [others, othersNamed]) => others - most || othersNamed - named
+    message.data.items.sort((a, b) => compare(ranks.get(a), ranks.get(b)))
   }
   send(message)
 }

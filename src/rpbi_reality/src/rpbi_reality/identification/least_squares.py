@@ -23,6 +23,8 @@ START_STEPS = 5
 """Number of steps of a short search, for each of two differences."""
 BEST = 4
 """Number of results of short searches that are compared in all runs."""
+LEAST_STEPS = 3
+"""Least number of steps of a search in all runs, if evaluations are left."""
 REACHES = (0.1, 0.04)
 """Standard deviations of random steps along the least determined direction, as fractions of the bounds."""
 PARTS = 5
@@ -53,8 +55,8 @@ def search_by_least_squares(
     """
     before, count = evaluate.simulated, len(space.names)
     slopes_and_start, settling = 2 * count + 1, 3 * count + 4
-    parts = min(PARTS, len(runs) // 2)
-    kept = settling + ((PART_STEPS * slopes_and_start + settling) + parts + 2 if parts > 1 else 0)
+    parts = min(PARTS, len(runs) // 2) if len(runs) >= 4 else 0
+    kept = settling + (PART_STEPS * slopes_and_start + settling + parts + 2 if parts else 0)
     if config.evaluations < 3 * kept:
         parts, kept = 0, settling if config.evaluations > 3 * settling else 0
 
@@ -65,20 +67,26 @@ def search_by_least_squares(
     def among(some: Sequence[int]) -> _Runs:
         return _Runs(space, evaluate, some, report)
 
-    random, every, unit = np.random.default_rng(config.seed), among(runs), space.first
-    few = max(1, len(runs) // FEW)
-    tries, cost = left() * len(runs) // (4 * few), 2 * START_STEPS * slopes_and_start
-    if tries >= 8 * slopes_and_start:
-        tried = among(runs[:few]).sorted_by_loss([unit, *qmc.Halton(count, seed=config.seed).random(tries)])
+    def short_searches() -> np.ndarray:
+        """Returns the best result of short searches, or the first values if there are too few evaluations."""
+        few = max(1, len(runs) // FEW)
+        tries, cost = left() * len(runs) // (4 * few), 2 * START_STEPS * slopes_and_start
+        if tries < 8 * slopes_and_start:
+            return space.first
+        tried = among(runs[:few]).sorted_by_loss([space.first, *qmc.Halton(count, seed=config.seed).random(tries)])
+        starts = min(STARTS, max(1, left() * len(runs) // (4 * few * cost)))
         ends = []
-        for i, end in enumerate(_apart(tried, min(STARTS, max(1, left() * len(runs) // (4 * few * cost))))):
+        for i, end in enumerate(_apart(tried, starts)):
             some = among([runs[(i * few + j) % len(runs)] for j in range(few)])
             for difference in DIFFERENCES[:2]:
                 end = some.descend(end, difference, START_STEPS * slopes_and_start)
             ends.append(end)
-        unit = every.sorted_by_loss(among(runs[:few]).sorted_by_loss([tried[0], *ends])[:BEST])[0]
+        return every.sorted_by_loss(among(runs[:few]).sorted_by_loss([tried[0], *ends])[:BEST])[0]
+
+    random, every = np.random.default_rng(config.seed), among(runs)
+    unit = short_searches()
     for searches, difference in zip((5, 4, 3), DIFFERENCES):
-        unit = every.descend(unit, difference, left() // searches)
+        unit = every.descend(unit, difference, min(left(), max(left() // searches, LEAST_STEPS * slopes_and_start)))
     for reach in REACHES:
         tries = (left() // 2 - slopes_and_start) // 2
         if tries >= slopes_and_start:
