@@ -218,7 +218,8 @@ def _keys(mapping: Schema, root: Schema, places: Places, homes: Homes) -> str:
     rows = []
     for key, value in _values(mapping).items():
         meaning = resolved(value, root)["description"] if "description" not in value else value["description"]
-        rows.append((code(key), _type(key, value, root, places, homes), _default(key, mapping), meaning))
+        linked = re.sub(r"\bdocs/(\w+\.md)", r"[\1](\1)", meaning)
+        rows.append((code(key), _type(key, value, root, places, homes), _default(key, mapping), linked))
     if mapping.get("additionalProperties") is True:
         rows.append(("others", "", "", "Keys of its class."))
     return table(HEAD, rows)
