@@ -165,9 +165,13 @@ def on_post_build(config: Any) -> None:
         index["config"]["fields"][field]["boost"] = boost
     path.write_text(json.dumps(index), encoding="utf-8")
     (worker,) = site.glob("assets/javascripts/workers/search.*.min.js")
-    words = config.extra["search"]["words"].items()
-    phrases = json.dumps({uri.replace(".md", ".html"): list(map(str, each)) for uri, each in words})
-    query = f"const PHRASES = {phrases}\n{(HERE / 'query.js').read_text(encoding='utf-8')}"
+    words = config.extra["search"]["words"]
+    pages = {
+        page.file.dest_uri: {"title": page.title, "phrases": list(map(str, words.get(page.file.src_uri, [])))}
+        for section in config.extra["nav"].items
+        for page in pages_of(section)
+    }
+    query = f"const PAGES = {json.dumps(pages)}\n{(HERE / 'query.js').read_text(encoding='utf-8')}"
     worker.write_text(query + worker.read_text(encoding="utf-8"), encoding="utf-8")
 
 

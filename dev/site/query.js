@@ -1,8 +1,9 @@
 // Part of the search's worker: drops words of a question that would match the beginnings of many others, such as "to",
-// and lists first the pages that have most words of the question: in one section, or in one of their PHRASES, which
-// mkdocs.yml names and the build writes in front of this file.
+// and lists first the pages that have most words of the question: in one section, in their title, or in one of their
+// phrases. The build writes PAGES, with the titles and the phrases that mkdocs.yml names, in front of this file.
 const COMMON = new Set(
-  "a an and are at can do does for from how i in is it my not of on or the there to what when where which why with".split(" ")
+  ("a add an and are at can do does for from get how i in is it make my not of on or run so the there to use using what " +
+    "when where which why with").split(" ")
 )
 const QUERY = 2
 const RESULT = 3
@@ -17,8 +18,9 @@ self.addEventListener("message", ({ data }) => {
 })
 const inSection = (item) => Object.entries(item.terms).filter(([, found]) => found).map(([term]) => singular(term))
 function rankOf(page) {
-  const phrases = (PHRASES[page[0].location.split("#")[0]] || []).map(wordsOf)
-  const named = phrases.filter((phrase) => phrase.length && phrase.every((word) => asked.includes(word))).flat()
+  const { title = "", phrases = [] } = PAGES[page[0].location.split("#")[0]] || {}
+  const whole = phrases.map(wordsOf).filter((phrase) => phrase.length && phrase.every((word) => asked.includes(word)))
+  const named = [...whole.flat(), ...wordsOf(title).filter((word) => asked.includes(word))]
   const counts = page.map((item) => new Set([...inSection(item), ...named]).size)
   return [Math.max(...counts), new Set(named).size]
 }
