@@ -113,5 +113,5 @@ def agree(shown: str, printed: str, varies: bool = False) -> bool:
 
 def _shape(text: str) -> str:
     """Returns a text with 0 for each number, and a space for each run of spaces."""
-    numbers = re.sub(r"-?\d[\d.,]*(?:e[-+]?\d+)?", "0", text)
+    numbers = re.sub(r"-?\d(?:[\d.,]*\d)?(?:e[-+]?\d+)?", "0", text)
     return re.sub(r"[ \t]+", " ", numbers)
