@@ -13,6 +13,7 @@ from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.nav import Navigation, Section
 from mkdocs.structure.pages import Page
+from pymdownx.slugs import slugify
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -34,6 +35,7 @@ BOOSTS = {"title": 10.0, "tags": 1.0}
 """
 OVERVIEW = re.compile(r"overview/(\w+)/index\.md")
 """A page that lists all pages of its tab."""
+slug = slugify(case="lower")  # the anchors that mkdocs.yml sets
 LOG = logging.getLogger("mkdocs.hooks.site")
 MIRROR = tempfile.TemporaryDirectory(prefix="site-api-")
 
@@ -91,7 +93,7 @@ def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
 
 
 def overview(page: Page, config: Any) -> str:
-    """Returns a page that lists the pages of its tab with their first paragraphs."""
+    """Returns a page that lists the pages of its tab with their first sentences."""
     page.meta["search"] = {"exclude": True}
     (tab,) = (each for each in config.extra["nav"].items if isinstance(each, Section) and page in each.children)
     lines = [f"# {tab.title}", ""]
@@ -115,13 +117,8 @@ def title_of(config: Any, target: str) -> str:
     if not section:
         return title
     names = re.findall(r"^#+ (.*)", source(config, page).read_text(encoding="utf-8"), re.MULTILINE)
-    name = next((each for each in names if slug(each) == section), section)
+    name = next((each for each in names if slug(each, "-") == section), section)
     return f"{title}: {name}" if page != "commands.md" else f"`./rpbi {name}`"
-
-
-def slug(text: str) -> str:
-    """Returns the anchor of a heading."""
-    return re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
 
 
 def source(config: Any, name: str) -> Path:
@@ -140,8 +137,10 @@ def heading(config: Any, name: str) -> str:
 def on_env(env: Any, config: Any, files: Files) -> None:
     """Refuses words and ranks for the search of pages that are not there."""
     known = {file.src_uri for file in files.documentation_pages()}
-    for uri in sorted({uri for pages in config.extra["search"].values() for uri in pages} - known):
-        LOG.warning("mkdocs.yml: extra.search names %s, which is not there", uri)
+    search, reference = config.extra["search"], config.extra["reference"]
+    for key, named in (("search", {uri for pages in search.values() for uri in pages}), ("reference", {*reference})):
+        for uri in sorted(named - known):
+            LOG.warning("mkdocs.yml: extra.%s names %s, which is not there", key, uri)
 
 
 def on_nav(nav: Navigation, config: Any, files: Files) -> None:
@@ -195,4 +194,4 @@ def first_paragraph(markdown: str) -> str:
 
 def first_sentence(markdown: str) -> str:
     """Returns the first sentence of a page, without links."""
-    return re.split(r"(?<=[.:?])\s", first_paragraph(markdown))[0].rstrip(":") or ""
+    return re.split(r"(?<=[.:?])\s", first_paragraph(markdown))[0].rstrip(":")
