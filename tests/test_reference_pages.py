@@ -16,11 +16,15 @@ from rpbi.world import World
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/from_pybullet.md").read_text(encoding="utf-8")
 ROWS = [line.split("|")[1:-1] for line in PAGE.splitlines() if line.startswith("| `")]
-ROBOTS = re.findall(
-    r"^\| [^|]+ \| `([^`]+\.urdf)` \| (\d+) \|",
-    (ROOT / "docs/example_robots.md").read_text(encoding="utf-8"),
-    re.MULTILINE,
-)
+ROBOT_PAGE = (ROOT / "docs/example_robots.md").read_text(encoding="utf-8")
+ROBOTS = re.findall(r"^\| [^|]+ \| `([^`]+\.urdf)` \| (\d+) \|", ROBOT_PAGE, re.MULTILINE)
+EXAMPLES = re.findall(r"^\| `basic_example_(\w+)` \| [^|]+ \| ([^|]+) \|", ROBOT_PAGE, re.MULTILINE)
+
+
+def moving_joints(file: str) -> list[ET.Element]:
+    """Returns the joints of a URDF that can move."""
+    tree = ET.parse(find_file(file, str(ROOT / "docs/example_robots.md"))).getroot()
+    return [each for each in tree.findall("joint") if each.get("type") in ("revolute", "continuous", "prismatic")]
 
 
 def test_functions_are_those_of_pybullet():
@@ -41,9 +45,16 @@ def test_counterparts_exist():
 
 @pytest.mark.parametrize(("file", "joints"), ROBOTS)
 def test_robots_have_the_stated_joints(file, joints):
-    tree = ET.parse(find_file(file, "docs/example_robots.md")).getroot()
-    moving = [each for each in tree.findall("joint") if each.get("type") in ("revolute", "continuous", "prismatic")]
-    assert sum(each.find("mimic") is None for each in moving) == int(joints)
+    assert sum(each.find("mimic") is None for each in moving_joints(file)) == int(joints)
+
+
+@pytest.mark.parametrize(("name", "joints"), EXAMPLES)
+def test_robots_of_the_examples_have_the_stated_joints(name, joints):
+    folder = ROOT / f"src/rpbi_examples/configs/basic_example_{name}"
+    texts = [path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.yaml"))]
+    (file,) = {urdf for text in texts for urdf in re.findall(r"fileName: \"?([^\s\"]+\.urdf)", text)}
+    robots = 2 if name.startswith("dual_") else 1
+    assert robots * len(moving_joints(file)) == sum(map(int, re.findall(r"\d+", joints)))
 
 
 def test_citation_names_all_authors():

@@ -205,12 +205,12 @@ def test_all_pages_are_in_the_navigation(site):
     assert all((site / page).exists() and (site / page).with_suffix(".html").exists() for page in listed)
 
 
-def test_tabs_begin_with_an_overview_of_their_pages(site):
+def test_tabs_begin_with_an_overview_of_their_pages(site, search):
     page = (site / "overview/control/index.html").read_text(encoding="utf-8")
     listed = dict(re.findall(r'<li><a href="\.\./\.\./(\w+)\.html">[^<]+</a>: ([^<]+)', page))
     assert {"ik", "planning", "safety", "real_robots"} <= listed.keys()
     assert all(text.strip() for text in listed.values())
-    assert not SiteSearch(site).pages("Control")[0].startswith("overview/")
+    assert not search.pages("Control")[0].startswith("overview/")
 
 
 def test_site_loads_nothing_from_elsewhere(site):

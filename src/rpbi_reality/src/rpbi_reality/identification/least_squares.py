@@ -46,10 +46,11 @@ def search_by_least_squares(
       apart, each in a few other runs. The search continues from the best of their results.
     - The differences for the derivatives are large at first, so that they reach over jumps, and become smaller
       (implicit filtering, Kelley 2011).
-    - From the end, random steps along the directions that the data determine least look for a way on. Each is
-      corrected by a Gauss-Newton step, which follows a curved valley.
+    - Random steps from the end, along the directions that the data determine least, look for smaller errors. Each is
+      corrected by a Gauss-Newton step.
     - At last, each of several disjoint parts of the runs is searched by itself. The ends show how far the result
       depends on the runs, including on their jumps; if one of them is better in all runs, the search continues there.
+    - The last Gauss-Newton step is made only along the directions that lower the loss.
 
     A candidate in a part of the runs counts as that part of an evaluation.
     """
@@ -96,11 +97,11 @@ def search_by_least_squares(
     ends = []
     for part in (among(runs[i::parts]) for i in range(parts)):
         end = part.descend(unit, DIFFERENCES[1], PART_STEPS * slopes_and_start)
-        ends.append(part.settle(end, DIFFERENCES[-1]))
+        ends.append(part.settle(end))
     if ends:
         unit = every.sorted_by_loss([unit, *ends, np.mean(ends, 0)])[0]
     if kept:
-        unit = every.settle(unit, DIFFERENCES[-1])
+        unit = every.settle(unit)
     every.rows(unit)
     every.jacobian(unit, DIFFERENCES[-1], counts_jumps=False)  # for the uncertainty
     empty = np.zeros((0, count)), np.zeros((0, len(runs)))
@@ -185,17 +186,16 @@ class _Runs:
         losses = [loss(start), *map(loss, rows), *self.losses(corrected)]
         return [unit, *tried, *corrected][int(np.argmin(losses))]
 
-    def settle(self, unit: np.ndarray, difference: float) -> np.ndarray:
+    def settle(self, unit: np.ndarray) -> np.ndarray:
         """Returns coordinates after a Gauss-Newton step, of which only the parts that lower the loss are made.
 
         A jump along one direction makes a search refuse the whole step; here, the other directions still improve.
 
         Args:
             unit: The start.
-            difference: Step of the finite differences.
         """
         rows = self.rows(unit)
-        jacobian = self.jacobian(unit, difference, counts_jumps=False)
+        jacobian = self.jacobian(unit, DIFFERENCES[-1], counts_jumps=False)
         weights = (1.0 + (rows / SOFT) ** 2) ** -0.25
         left, singular, axes = np.linalg.svd(jacobian * weights[:, None], full_matrices=False)
         sizes = (left.T @ (rows * weights)) / np.maximum(singular, 1e-12)
